@@ -1,0 +1,3 @@
+// Copyright 2026 the Understory authors
+// SPDX-License-Identifier: BSD-3-Clause
+#include "understory/sim/forest.hpp"
