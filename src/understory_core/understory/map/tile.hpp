@@ -43,6 +43,18 @@ struct Tile {
   [[nodiscard]] bool is_free(const VoxelIndex& voxel) const { return test(free_rows, voxel); }
   [[nodiscard]] bool is_known(const VoxelIndex& voxel) const { return test(known_rows, voxel); }
 
+  // Writes one voxel, log-odds and bits.
+  void set(std::size_t offset, std::int8_t value) {
+    const auto bit = static_cast<std::uint16_t>(1U << (offset & 15U));
+    std::uint16_t& free_row = free_rows[offset >> 4U];
+    std::uint16_t& known_row = known_rows[offset >> 4U];
+    const bool is_known = value != kUnknownLogOdds;
+    const bool is_free = is_known && value < 0;
+    log_odds[offset] = value;
+    free_row = static_cast<std::uint16_t>(is_free ? free_row | bit : free_row & ~bit);
+    known_row = static_cast<std::uint16_t>(is_known ? known_row | bit : known_row & ~bit);
+  }
+
  private:
   [[nodiscard]] static bool test(const std::array<std::uint16_t, kRowsPerTile>& rows,
                                  const VoxelIndex& voxel) {
