@@ -1,5 +1,5 @@
 # Compile options shared by every package: language, warnings, build type, sanitizers.
-include_guard(GLOBAL)
+include_guard(DIRECTORY)  # sets directory variables, so every package needs its own
 
 set(CMAKE_CXX_STANDARD 17)
 set(CMAKE_CXX_STANDARD_REQUIRED ON)
