@@ -124,6 +124,8 @@ FreeBlock free_block_around(const MapSnapshot& snapshot, const Vector3i& tile) {
   return block;
 }
 
+constexpr double kHalfDiagonal = 0.8660254037844386;  // of a voxel, in voxels
+
 double square(double x) {
   return x * x;
 }
@@ -262,6 +264,15 @@ DistanceAndGradient ClearanceMap::distance_and_gradient(const Vector3d& point_m)
       {slope_low + (slope_high - slope_low) * f.z(), low_y + (high_y - low_y) * f.z(), high - low}};
 }
 
+double ClearanceMap::distance_lower_bound_m(const Vector3d& point_m) const {
+  const VoxelIndex voxel = geometry().index_of(point_m);
+  const auto square_voxels = static_cast<std::size_t>(squared_distance_voxels(voxel));
+  const double off_center_m = (point_m - geometry().center_of(voxel)).norm();
+  const double center_distance_voxels = static_cast<double>(kSquareRoot[square_voxels]);
+  return std::max(
+      0.0, (center_distance_voxels - kHalfDiagonal) * geometry().resolution_m() - off_center_m);
+}
+
 bool ClearanceMap::clearance_at_least(const Vector3d& point_m, double radius_m) const {
   assert(radius_m < max_distance_m() - 2.0 * geometry().resolution_m());
   const VoxelIndex voxel = geometry().index_of(point_m);
@@ -271,7 +282,6 @@ bool ClearanceMap::clearance_at_least(const Vector3d& point_m, double radius_m) 
   }
   // From the point to the nearest blocked voxel's box it is at least, and at most, this far; the
   // slack keeps rounding out of the decision.
-  constexpr double kHalfDiagonal = 0.8660254037844386;
   constexpr double kSlack = 1e-5;
   const double scale = 1.0 / geometry().resolution_m();
   const double off_center = (point_m - geometry().center_of(voxel)).norm() * scale;

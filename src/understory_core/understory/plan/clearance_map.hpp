@@ -45,6 +45,10 @@ class ClearanceMap {
   [[nodiscard]] double distance_m(const Vector3d& point_m) const;
   [[nodiscard]] DistanceAndGradient distance_and_gradient(const Vector3d& point_m) const;
 
+  // The distance from the point to any voxel that is not free is at least this (0 in such a voxel);
+  // one look-up, up to two voxel diagonals below the truth.
+  [[nodiscard]] double distance_lower_bound_m(const Vector3d& point_m) const;
+
   // Exact: the closed ball around the point touches no voxel that is not free.
   // radius_m < max_distance_m() - 2 voxels.
   [[nodiscard]] bool clearance_at_least(const Vector3d& point_m, double radius_m) const;
