@@ -14,6 +14,7 @@ namespace {
 
 // A quaternion of zeros, or one never normalised, yields a finite matrix that is no rotation.
 constexpr double kRotationTolerance = 1e-3;
+constexpr int kUnknown = static_cast<int>(kUnknownLogOdds);
 
 bool is_valid(const Pose& pose) {
   const Eigen::Matrix3d product = pose.linear() * pose.linear().transpose();
@@ -199,8 +200,8 @@ IntegrateCounts Mapper::apply_marks(TileSlot slot, const TileMarks& marks) {
       const bool is_hit = (hits & bit) != 0;
       const std::size_t offset = row * kTileVoxels + x;
       const Tile* tile = current_.tiles[slot].get();
-      const int before = tile == nullptr ? kUnknownLogOdds : tile->log_odds[offset];
-      const int start = before == kUnknownLogOdds ? 0 : before;
+      const int before = tile == nullptr ? kUnknown : tile->log_odds_at(offset);
+      const int start = before == kUnknown ? 0 : before;
       const int after = std::clamp(start + (is_hit ? model.hit : model.miss), model.min, model.max);
       if (after != before) {
         counts.missed_voxels += is_hit ? 0U : 1U;
@@ -220,7 +221,7 @@ void Mapper::mark_free(const Box3d& region_m, Time stamp) {
         const VoxelIndex voxel(x, y, z);
         const Tile* tile = current_.tile_at(voxel);
         const std::size_t offset = offset_in_tile(voxel);
-        const int before = tile == nullptr ? kUnknownLogOdds : tile->log_odds[offset];
+        const int before = tile == nullptr ? kUnknown : tile->log_odds_at(offset);
         if (region_m.contains(geometry().center_of(voxel)) && before < 0 && before != free_clamp) {
           writable_tile(geometry().slot_of(voxel)).set(offset, free_clamp);
         }

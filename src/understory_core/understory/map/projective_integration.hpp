@@ -24,7 +24,7 @@ class CameraView {
   // inward_normal . (point - origin) >= offset_vox holds for points in view.
   struct Plane {
     Eigen::Vector3f inward_normal;
-    float offset_vox;
+    float offset_vox = 0.0F;
   };
 
   CameraView(const CameraModel& camera, const Pose& world_from_optical, double resolution_m);

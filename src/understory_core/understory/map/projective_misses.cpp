@@ -12,6 +12,8 @@
 namespace understory {
 namespace {
 
+// Not smaller than any depth, "no return" (infinite) included.
+constexpr float kBeyondEverything = std::numeric_limits<float>::infinity();
 constexpr int kLanes = kTileVoxels;  // a row of a tile
 
 // The 16 rows along x of one layer of a tile: which voxels' centres lie between the planes.
@@ -165,7 +167,7 @@ class FrustumMarker {
       const float x = x0 + step;
       block_u[lane] = static_cast<int>(smaller(larger(u, 0.0F), u_limit));
       block_v[lane] = static_cast<int>(smaller(larger(v, 0.0F), v_limit));
-      depth[lane] = x * x + yz_squared <= range_squared ? z : std::numeric_limits<float>::max();
+      depth[lane] = x * x + yz_squared <= range_squared ? z : kBeyondEverything;
     }
     std::uint32_t bits = 0;
     for (std::size_t lane = 0; lane < depth.size(); ++lane) {

@@ -34,7 +34,7 @@ inline constexpr std::int8_t kUnknownLogOdds = -128;
 }
 
 struct Tile {
-  std::array<std::int8_t, kVoxelsPerTile> log_odds;      // unit: SensorModel::kLogOddsUnit
+  std::array<std::int8_t, kVoxelsPerTile> log_odds{};    // unit: SensorModel::kLogOddsUnit
   std::array<std::uint16_t, kRowsPerTile> free_rows{};   // bit x set: free
   std::array<std::uint16_t, kRowsPerTile> known_rows{};  // bit x set: observed at least once
 
@@ -42,6 +42,10 @@ struct Tile {
 
   [[nodiscard]] bool is_free(const VoxelIndex& voxel) const { return test(free_rows, voxel); }
   [[nodiscard]] bool is_known(const VoxelIndex& voxel) const { return test(known_rows, voxel); }
+
+  [[nodiscard]] int log_odds_at(std::size_t offset) const {
+    return static_cast<int>(log_odds[offset]);  // NOLINT(bugprone-signed-char-misuse): it is signed
+  }
 
   // Writes one voxel, log-odds and bits.
   void set(std::size_t offset, std::int8_t value) {
