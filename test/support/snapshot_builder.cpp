@@ -26,6 +26,9 @@ SnapshotBuilder::SnapshotBuilder(double resolution_m, const Box3d& box_m)
   current_.tiles.resize(current_.geometry.slot_count());
   tiles_.resize(current_.geometry.slot_count());
   touched_.resize(current_.geometry.slot_count(), false);
+  for (std::size_t state = 0; state < log_odds_.size(); ++state) {
+    log_odds_[state] = log_odds_of(current_.sensor_model, static_cast<VoxelState>(state));
+  }
 }
 
 SnapshotBuilder& SnapshotBuilder::set(const VoxelIndex& voxel, VoxelState state) {
@@ -35,7 +38,7 @@ SnapshotBuilder& SnapshotBuilder::set(const VoxelIndex& voxel, VoxelState state)
   const TileSlot slot = geometry().slot_of(voxel);
   Tile& tile = tiles_[slot];
   touched_[slot] = true;
-  tile.log_odds[offset_in_tile(voxel)] = log_odds_of(current_.sensor_model, state);
+  tile.log_odds[offset_in_tile(voxel)] = log_odds_[static_cast<std::size_t>(state)];
   const std::size_t row = row_in_tile(voxel.y(), voxel.z());
   const unsigned bit = 1U << (static_cast<unsigned>(voxel.x()) & 15U);
   const auto with = [bit](std::uint16_t bits, bool on) {

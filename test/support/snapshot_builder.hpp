@@ -6,6 +6,8 @@
 // shape when its centre does.
 #pragma once
 
+#include <array>
+#include <cstdint>
 #include <functional>
 #include <vector>
 
@@ -33,6 +35,7 @@ class SnapshotBuilder {
                  VoxelState state);
 
   MapSnapshot current_;
+  std::array<std::int8_t, 4> log_odds_{};  // one that stands for each state
   std::vector<Tile> tiles_;
   std::vector<bool> touched_;
 };
