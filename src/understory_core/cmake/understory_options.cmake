@@ -1,7 +1,7 @@
 # What the CMakeLists of all packages share: language, warnings, build type, sanitizers, and how a
 # package finds our other libraries. The plain build includes it from the root; in a catkin build it
 # comes with find_package(catkin COMPONENTS understory_core).
-include_guard(GLOBAL)
+include_guard(DIRECTORY)  # sets directory variables, so every package needs its own
 
 set(CMAKE_CXX_STANDARD 17)
 set(CMAKE_CXX_STANDARD_REQUIRED ON)

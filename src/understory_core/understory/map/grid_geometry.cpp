@@ -2,6 +2,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "understory/map/grid_geometry.hpp"
 
+#include <algorithm>
+#include <cmath>
+
 #include "understory/base/config.hpp"
 
 namespace understory {
@@ -39,6 +42,23 @@ GridGeometry::GridGeometry(double resolution_m, const Box3d& box_m)
 
 Box3d GridGeometry::box_m() const {
   return {voxels_.min.cast<double>() * resolution_m_, voxels_.end.cast<double>() * resolution_m_};
+}
+
+VoxelBox GridGeometry::voxels_touched_by(const Box3d& region_m) const {
+  if (region_m.min().hasNaN() || region_m.max().hasNaN()) {
+    return {};
+  }
+  VoxelBox touched;
+  for (int axis = 0; axis < 3; ++axis) {
+    // Clamped before the conversion: 1e300 m must not overflow an int.
+    const double box_min = voxels_.min[axis];
+    const double box_end = voxels_.end[axis];
+    const double low = std::floor(region_m.min()[axis] * inverse_resolution_);
+    const double high = std::floor(region_m.max()[axis] * inverse_resolution_) + 1.0;
+    touched.min[axis] = static_cast<int>(std::clamp(low, box_min, box_end));
+    touched.end[axis] = static_cast<int>(std::clamp(high, box_min, box_end));
+  }
+  return touched.empty() ? VoxelBox{} : touched;
 }
 
 Vector3i GridGeometry::tile_of_slot(TileSlot slot) const {

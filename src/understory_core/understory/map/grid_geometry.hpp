@@ -52,6 +52,10 @@ class GridGeometry {
     return (voxel.cast<double>().array() + 0.5) * resolution_m_;
   }
 
+  // The voxels of the box that a region touches. The region may lie anywhere and have any size,
+  // infinite too; none if it has a NaN.
+  [[nodiscard]] VoxelBox voxels_touched_by(const Box3d& region_m) const;
+
   // Tiles that the box touches; tile t covers voxels [16 t, 16 t + 16).
   [[nodiscard]] const Vector3i& tile_min() const { return tile_min_; }
   [[nodiscard]] const Vector3i& tile_count() const { return tile_count_; }

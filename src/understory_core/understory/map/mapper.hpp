@@ -9,12 +9,14 @@
 #pragma once
 
 #include <cstddef>
-#include <cstdint>
+#include <memory>
 #include <vector>
 
 #include "understory/base/result.hpp"
 #include "understory/base/time.hpp"
 #include "understory/map/map_snapshot.hpp"
+#include "understory/map/projective_integration.hpp"
+#include "understory/map/scan_window.hpp"
 #include "understory/sense/camera_model.hpp"
 
 namespace understory {
@@ -34,8 +36,8 @@ enum class IntegrateError { kBadPose, kImageSizeMismatch };
 
 struct IntegrateCounts {
   std::size_t hit_voxels = 0;
-  std::size_t missed_voxels = 0;
-  std::size_t skipped_points = 0;  // NaN: no measurement
+  std::size_t missed_voxels = 0;   // lowered; those at the free clamp already do not count
+  std::size_t skipped_points = 0;  // no measurement: NaN, zero, negative depth
 };
 
 // Borrowed points of an unorganised cloud, each three floats in the sensor's frame.
@@ -49,10 +51,11 @@ class Mapper {
  public:
   Mapper(const MapConfig& config, const Box3d& box_m);
   // Goes on from a saved map of the same geometry.
-  explicit Mapper(MapSnapshot resumed);
+  explicit Mapper(MapSnapshot resumed);  // ConfigError if its tiles do not fit its geometry
 
   // Projective integration of an organised cloud or depth image: the view frustum's voxels are
-  // compared with the image once each.
+  // compared with the image once each. An image so coarse that rays would leave gaps between its
+  // pixels within range is integrated ray by ray instead.
   Result<IntegrateCounts, IntegrateError> integrate(const CameraModel& camera,
                                                     const DepthView& depth,
                                                     const Pose& world_from_optical,
@@ -65,7 +68,8 @@ class Mapper {
                                                          double max_range_m,
                                                          Time exposure);
 
-  // What the operator vouches for (the launch site): observed free, unless already occupied.
+  // What the operator vouches for (the launch site): voxels whose centres lie in the region become
+  // observed free, except those that returns have marked (log-odds of 0 and more).
   void mark_free(const Box3d& region_m, Time stamp);
 
   // The map as of now; its changed_tiles are those since the previous call.
@@ -74,11 +78,18 @@ class Mapper {
   [[nodiscard]] const GridGeometry& geometry() const { return current_.geometry; }
 
  private:
+  // Hits and misses of the window into the tiles; clones a tile only if a voxel of it changes.
+  IntegrateCounts apply_window();
+  IntegrateCounts apply_marks(TileSlot slot, const TileMarks& marks);
+  void integrate_depth_rays(const CameraView& view, const DepthView& depth);
   Tile& writable_tile(TileSlot slot);
 
   MapSnapshot current_;
-  std::vector<std::uint8_t> tile_is_private_;  // written since the last publication
+  // Written since the last publication and not yet seen by anyone else; also in current_.tiles.
+  std::vector<std::shared_ptr<Tile>> private_tiles_;
   std::vector<TileSlot> touched_;
+  ScanWindow window_;
+  ProjectiveIntegration projective_;
 };
 
 }  // namespace understory

@@ -34,7 +34,7 @@ inline constexpr std::int8_t kUnknownLogOdds = -128;
 }
 
 struct Tile {
-  std::array<std::int8_t, kVoxelsPerTile> log_odds;      // unit: SensorModel::kLogOddsUnit
+  std::array<std::int8_t, kVoxelsPerTile> log_odds{};    // unit: SensorModel::kLogOddsUnit
   std::array<std::uint16_t, kRowsPerTile> free_rows{};   // bit x set: free
   std::array<std::uint16_t, kRowsPerTile> known_rows{};  // bit x set: observed at least once
 
@@ -43,6 +43,22 @@ struct Tile {
 
   [[nodiscard]] bool is_free(const VoxelIndex& voxel) const { return test(free_rows, voxel); }
   [[nodiscard]] bool is_known(const VoxelIndex& voxel) const { return test(known_rows, voxel); }
+
+  [[nodiscard]] int log_odds_at(std::size_t offset) const {
+    return static_cast<int>(log_odds[offset]);  // NOLINT(bugprone-signed-char-misuse): it is signed
+  }
+
+  // Writes one voxel, log-odds and bits.
+  void set(std::size_t offset, std::int8_t value) {
+    const auto bit = static_cast<std::uint16_t>(1U << (offset & 15U));
+    std::uint16_t& free_row = free_rows[offset >> 4U];
+    std::uint16_t& known_row = known_rows[offset >> 4U];
+    const bool is_known = value != kUnknownLogOdds;
+    const bool is_free = is_known && value < 0;
+    log_odds[offset] = value;
+    free_row = static_cast<std::uint16_t>(is_free ? free_row | bit : free_row & ~bit);
+    known_row = static_cast<std::uint16_t>(is_known ? known_row | bit : known_row & ~bit);
+  }
 
  private:
   [[nodiscard]] static bool test(const std::array<std::uint16_t, kRowsPerTile>& rows,

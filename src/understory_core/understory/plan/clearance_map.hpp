@@ -4,7 +4,9 @@
 // How far it is to the nearest voxel that is not known free (unknown, uncertain, occupied, outside
 // the box). Metres, world frame. Kept per map tile and brought up to date from the tiles that
 // changed; distances are exact Euclidean between voxel centres up to max_distance_m(), beyond
-// which they saturate (Felzenszwalb and Huttenlocher 2012, windowed). Used by one thread.
+// which they saturate (Felzenszwalb and Huttenlocher 2012, windowed). Used by one thread: a read
+// computes the tile it falls into when a change has made that stale, so that tiles nobody asks for
+// cost nothing; the answers do not depend on when that happens.
 #pragma once
 
 #include <array>
@@ -43,17 +45,35 @@ class ClearanceMap {
   [[nodiscard]] double distance_m(const Vector3d& point_m) const;
   [[nodiscard]] DistanceAndGradient distance_and_gradient(const Vector3d& point_m) const;
 
+  // The distance from the point to any voxel that is not free is at least this (0 in such a voxel);
+  // one look-up, up to two voxel diagonals below the truth.
+  [[nodiscard]] double distance_lower_bound_m(const Vector3d& point_m) const;
+
   // Exact: the closed ball around the point touches no voxel that is not free.
   // radius_m < max_distance_m() - 2 voxels.
   [[nodiscard]] bool clearance_at_least(const Vector3d& point_m, double radius_m) const;
 
  private:
   using DistanceTile = std::array<std::uint8_t, kVoxelsPerTile>;
+  using DistanceTilePtr = std::shared_ptr<const DistanceTile>;
 
-  [[nodiscard]] std::shared_ptr<const DistanceTile> computed_tile(TileSlot slot) const;
+  // The eight voxel centres around a point and where the point lies between them.
+  struct Cell {
+    std::array<float, 8> distance_voxels;  // x fastest, then y, then z
+    Vector3d fraction;
+  };
+
+  void mark_stale(TileSlot slot, const VoxelBox& changed_in_tile);
+  [[nodiscard]] const DistanceTile& tile_of(TileSlot slot) const;
+  [[nodiscard]] DistanceTilePtr computed_tile(TileSlot slot) const;
+  [[nodiscard]] Cell cell_at(const Vector3d& point_m) const;
+  [[nodiscard]] bool ball_is_free(const Vector3d& point_m, double radius_m) const;
 
   MapSnapshotPtr snapshot_;
-  std::vector<std::shared_ptr<const DistanceTile>> tiles_;  // null: 0 throughout
+  DistanceTilePtr blocked_tile_;  // 0 throughout
+  DistanceTilePtr open_tile_;     // saturated throughout
+  // A cache: null where stale.
+  mutable std::vector<DistanceTilePtr> tiles_;
 };
 
 }  // namespace understory

@@ -1,0 +1,197 @@
+// Copyright 2026 the Understory authors
+// SPDX-License-Identifier: BSD-3-Clause
+#include "understory/explorer.hpp"
+
+#include <algorithm>
+#include <limits>
+
+namespace understory {
+namespace {
+
+// Routes keep a little more distance than trajectories must, so that smoothing has room.
+constexpr double kRouteExtraClearanceM = 0.04;
+
+std::unique_ptr<Strategy> make_strategy(const ExplorerConfig& config) {
+  const TravelRates rates{config.limits.limits_for(FlightMode::kCollector).speed_mps,
+                          config.limits.yaw_rate_radps};
+  return std::make_unique<ExplorerCollector>(config.explorer_collector, rates);
+}
+
+}  // namespace
+
+Limits LimitsConfig::limits_for(FlightMode mode) const {
+  const bool is_fast = mode == FlightMode::kCollector || mode == FlightMode::kTransit;
+  const double factor = is_fast && speed_cap == "paper" ? collector_factor : 1.0;
+  Limits limits;
+  limits.speed_mps = factor * speed_mps;
+  limits.acceleration_mps2 = factor * acceleration_mps2;
+  limits.yaw_rate_radps = yaw_rate_radps;
+  limits.yaw_acceleration_radps2 = yaw_acceleration_radps2;
+  return limits;
+}
+
+Explorer::Explorer(const ExplorerConfig& config, const GridGeometry& geometry)
+    : config_(config),
+      routes_(geometry,
+              config.plan.vehicle_radius_m + config.plan.margin_m + kRouteExtraClearanceM),
+      finder_(config.frontier, config.camera, geometry),
+      strategy_(make_strategy(config)),
+      set_aside_(duration_from_seconds(config.retry.set_aside_s), config.retry.max_tries) {}
+
+void Explorer::observe(const Pilot& pilot, const MapSnapshotPtr& snapshot) {
+  finder_.update(pilot.clearance(), snapshot, routes_);
+}
+
+// Drops a target that has been seen; sets one aside that takes too long or shows nothing new.
+void Explorer::review_target(const Pilot& pilot, Time now) {
+  if (!target_) {
+    return;
+  }
+  const Cluster& cluster = *target_->candidate.cluster;
+  if (finder_.is_seen(cluster)) {
+    target_.reset();
+    return;
+  }
+  const Trajectory& flown = *pilot.follower().newest();
+  const bool is_there =
+      now >= flown.end() + duration_from_seconds(config_.retry.dwell_s) &&
+      (flown.sample(now).position_m - target_->candidate.viewpoint.position_m).norm() <
+          pilot.clearance().geometry().resolution_m();
+  if (is_there) {
+    set_aside_.ban_view(target_->candidate.viewpoint);
+  }
+  if (is_there || now > target_deadline_) {
+    counters_.given_up += set_aside_.add(cluster, now) ? 1U : 0U;
+    ++counters_.set_aside;
+    target_.reset();
+  }
+}
+
+bool Explorer::is_due(const Pilot& pilot, Time now) {
+  const double waited_s = to_seconds(now - last_decision_);
+  if (counters_.decisions == 0) {
+    return true;
+  }
+  if (waited_s < config_.replan.min_interval_s) {
+    return false;
+  }
+  const bool stopped_short =
+      pilot.is_at_rest(now) && target_ &&
+      (pilot.follower().sample(now).position_m - target_->candidate.viewpoint.position_m).norm() >
+          pilot.clearance().geometry().resolution_m();
+  const bool still_moving = !pilot.is_at_rest(now);
+  return !target_ || stopped_short || (still_moving && waited_s >= config_.replan.max_interval_s);
+}
+
+StrategyInput Explorer::gather(const Pilot& pilot, Time now, Reach reach) {
+  StrategyInput input;
+  input.is_complete = reach != Reach::kNear;
+  input.vehicle = pilot.next_start_point(now);
+  input.mode = mode_;
+  input.target = target_ ? target_->candidate.cluster : nullptr;
+  std::vector<RouteLattice::Node> nodes;
+  for (const ClusterPtr& cluster : finder_.clusters()) {
+    if (set_aside_.is_given_up(*cluster) ||
+        (reach != Reach::kAllAndSetAside && set_aside_.is_waiting(*cluster, now))) {
+      continue;
+    }
+    for (const Viewpoint& viewpoint : cluster->viewpoints) {
+      if (!set_aside_.is_banned(viewpoint)) {
+        input.candidates.push_back({cluster, viewpoint, 0.0});
+        nodes.push_back(viewpoint.node);
+      }
+    }
+  }
+  const double max_length_m =
+      reach == Reach::kNear ? config_.replan.near_route_m : std::numeric_limits<double>::infinity();
+  routes_.run(pilot.clearance(), input.vehicle.position_m, nodes, max_length_m);
+  const auto unreachable = [this](Candidate& candidate) {
+    const std::optional<double> length_m = routes_.length_m(candidate.viewpoint.node);
+    candidate.route_length_m = length_m.value_or(0.0);
+    return !length_m.has_value();
+  };
+  input.candidates.erase(
+      std::remove_if(input.candidates.begin(), input.candidates.end(), unreachable),
+      input.candidates.end());
+  return input;
+}
+
+void Explorer::adopt(const Target& target, const Pilot& pilot, Time now) {
+  const bool is_same = target_ && target_->candidate.cluster->mean_m.isApprox(
+                                      target.candidate.cluster->mean_m, 1e-9);
+  if (!is_same) {
+    const double flight_s = target.candidate.route_length_m / config_.limits.speed_mps +
+                            to_seconds(pilot.follower().newest()->duration());
+    target_deadline_ = now + duration_from_seconds(flight_s * 2.0 + config_.retry.patience_s);
+  }
+  target_ = target;
+  mode_ = target.mode;
+}
+
+// Null: none of the targets tried can be flown to.
+TrajectoryPtr Explorer::try_targets(Pilot& pilot, StrategyInput input, Time now) {
+  for (int attempt = 0; attempt < config_.replan.max_attempts; ++attempt) {
+    const std::optional<Target> target = strategy_->choose(input);
+    if (!target) {
+      return nullptr;
+    }
+    const Result<TrajectoryPtr, PlanError> flown =
+        pilot.fly({routes_.route_m(target->candidate.viewpoint.node),
+                   target->candidate.viewpoint.yaw_rad,
+                   target->mode,
+                   config_.limits.limits_for(target->mode)},
+                  now);
+    if (flown) {
+      adopt(*target, pilot, now);
+      return *flown;
+    }
+    // From motion a plan may fail that works from rest; only then is the target to blame.
+    if (pilot.is_at_rest(now)) {
+      counters_.given_up += set_aside_.add(*target->candidate.cluster, now) ? 1U : 0U;
+      ++counters_.set_aside;
+    }
+    const Cluster* failed = target->candidate.cluster.get();
+    input.candidates.erase(
+        std::remove_if(input.candidates.begin(),
+                       input.candidates.end(),
+                       [failed](const Candidate& c) { return c.cluster.get() == failed; }),
+        input.candidates.end());
+  }
+  return nullptr;
+}
+
+ExploreStep Explorer::decide(Pilot& pilot, Time now) {
+  ExploreStep step;
+  step.decided = true;
+  ++counters_.decisions;
+  last_decision_ = now;
+  for (const Reach reach : {Reach::kNear, Reach::kAll, Reach::kAllAndSetAside}) {
+    const StrategyInput input = gather(pilot, now, reach);
+    counters_.full_searches += reach == Reach::kAll ? 1U : 0U;
+    if (!strategy_->choose(input)) {
+      continue;
+    }
+    step.published = try_targets(pilot, input, now);
+    return step;
+  }
+  step.status = ExploreStatus::kNothingLeft;
+  return step;
+}
+
+ExploreStep Explorer::step(Pilot& pilot, Time now) {
+  review_target(pilot, now);
+  // At rest there is nothing to brake; a way out is looked for at the usual pace.
+  const bool in_danger = !pilot.is_at_rest(now) && pilot.unsafe_from(now).has_value();
+  ExploreStep step;
+  if (in_danger || is_due(pilot, now)) {
+    step = decide(pilot, now);
+  }
+  if (in_danger && !step.published) {
+    const Result<TrajectoryPtr, PlanError> braked = pilot.brake(now);
+    step.published = braked ? *braked : nullptr;
+    step.status = ExploreStatus::kFlying;
+  }
+  return step;
+}
+
+}  // namespace understory

@@ -1,0 +1,79 @@
+// Copyright 2026 the Understory authors
+// SPDX-License-Identifier: BSD-3-Clause
+//
+// One decision cycle of the exploring vehicle, as in the paper's pipeline figure: map -> frontiers,
+// viewpoints, trails -> mode and target -> trajectory. World frame, SI units. Called with every map
+// update, on one thread; deterministic; nothing throws in flight. Targets that cannot be reached or
+// seen are set aside for a while, tried again a bounded number of times, then given up.
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "understory/explorer_config.hpp"
+#include "understory/frontier/frontier_finder.hpp"
+#include "understory/plan/pilot.hpp"
+#include "understory/plan/route_search.hpp"
+#include "understory/strategy/set_aside.hpp"
+#include "understory/strategy/strategy.hpp"
+
+namespace understory {
+
+enum class ExploreStatus : std::uint8_t {
+  kFlying,       // on the way to a target
+  kNothingLeft,  // no cluster is left that can be reached and seen
+};
+
+struct ExploreStep {
+  ExploreStatus status = ExploreStatus::kFlying;
+  bool decided = false;     // a decision was made in this cycle
+  TrajectoryPtr published;  // null: what is flown stands
+};
+
+struct ExplorerCounters {
+  std::uint64_t decisions = 0;
+  std::uint64_t full_searches = 0;
+  std::uint64_t set_aside = 0;
+  std::uint64_t given_up = 0;
+};
+
+class Explorer {
+ public:
+  Explorer(const ExplorerConfig& config, const GridGeometry& geometry);
+
+  // Frontiers only; for the phases of a mission that do not explore.
+  void observe(const Pilot& pilot, const MapSnapshotPtr& snapshot);
+  // Call after observe(), with the pilot on the same map.
+  ExploreStep step(Pilot& pilot, Time now);
+
+  [[nodiscard]] const std::vector<ClusterPtr>& clusters() const { return finder_.clusters(); }
+  [[nodiscard]] const std::optional<Target>& target() const { return target_; }
+  [[nodiscard]] FlightMode mode() const { return mode_; }
+  [[nodiscard]] const ExplorerCounters& counters() const { return counters_; }
+  [[nodiscard]] const SetAsideList& set_aside() const { return set_aside_; }
+  [[nodiscard]] RouteSearch& routes() { return routes_; }
+
+ private:
+  enum class Reach : std::uint8_t { kNear, kAll, kAllAndSetAside };
+
+  [[nodiscard]] bool is_due(const Pilot& pilot, Time now);
+  void review_target(const Pilot& pilot, Time now);
+  [[nodiscard]] StrategyInput gather(const Pilot& pilot, Time now, Reach reach);
+  ExploreStep decide(Pilot& pilot, Time now);
+  [[nodiscard]] TrajectoryPtr try_targets(Pilot& pilot, StrategyInput input, Time now);
+  void adopt(const Target& target, const Pilot& pilot, Time now);
+
+  ExplorerConfig config_;
+  RouteSearch routes_;
+  FrontierFinder finder_;
+  std::unique_ptr<Strategy> strategy_;
+  SetAsideList set_aside_;
+  FlightMode mode_ = FlightMode::kExplorer;
+  std::optional<Target> target_;
+  Time target_deadline_{};
+  Time last_decision_{};
+  ExplorerCounters counters_;
+};
+
+}  // namespace understory

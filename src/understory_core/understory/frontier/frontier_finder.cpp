@@ -1,0 +1,203 @@
+// Copyright 2026 the Understory authors
+// SPDX-License-Identifier: BSD-3-Clause
+#include "understory/frontier/frontier_finder.hpp"
+
+#include <algorithm>
+#include <set>
+
+#include "understory/frontier/clustering.hpp"
+#include "understory/frontier/trail_label.hpp"
+
+namespace understory {
+namespace {
+
+constexpr std::uint32_t kNoOwner = 0;
+constexpr std::uint32_t kPooled = 1;
+
+template <class Visit>
+void for_each_of_26_neighbours(const VoxelIndex& voxel, const Visit& visit) {
+  for (int dz = -1; dz <= 1; ++dz) {
+    for (int dy = -1; dy <= 1; ++dy) {
+      for (int dx = -1; dx <= 1; ++dx) {
+        if (dx != 0 || dy != 0 || dz != 0) {
+          visit(VoxelIndex(voxel.x() + dx, voxel.y() + dy, voxel.z() + dz));
+        }
+      }
+    }
+  }
+}
+
+}  // namespace
+
+FrontierFinder::FrontierFinder(const FrontierConfig& config,
+                               const CameraConfig& camera,
+                               const GridGeometry& geometry)
+    : config_(config),
+      sampler_(config.viewpoints, camera),
+      max_range_m_(camera.max_range_m),
+      geometry_(geometry),
+      field_(geometry),
+      owners_(geometry.slot_count()) {}
+
+std::uint32_t FrontierFinder::owner_of(const VoxelIndex& voxel) const {
+  if (!geometry_.contains(voxel)) {
+    return kNoOwner;
+  }
+  const Owners* owners = owners_[geometry_.slot_of(voxel)].get();
+  return owners == nullptr ? kNoOwner : (*owners)[offset_in_tile(voxel)];
+}
+
+void FrontierFinder::set_owner(const VoxelIndex& voxel, std::uint32_t owner) {
+  std::unique_ptr<Owners>& owners = owners_[geometry_.slot_of(voxel)];
+  if (!owners) {
+    owners = std::make_unique<Owners>();
+  }
+  (*owners)[offset_in_tile(voxel)] = owner;
+}
+
+// Takes apart every cluster that lost a voxel or that a new voxel touches, and returns the frontier
+// voxels that have no cluster now.
+std::vector<VoxelIndex> FrontierFinder::dissolve(const FrontierField::Change& change) {
+  std::set<std::uint32_t> affected;
+  for (const VoxelIndex& voxel : change.removed) {
+    affected.insert(owner_of(voxel));
+  }
+  for (const VoxelIndex& voxel : change.added) {
+    for_each_of_26_neighbours(voxel, [&](const VoxelIndex& neighbour) {
+      const std::uint32_t owner = owner_of(neighbour);
+      if (owner != kNoOwner) {
+        affected.insert(owner);
+      }
+    });
+  }
+  affected.erase(kNoOwner);
+  std::vector<VoxelIndex> pool;
+  for (const std::uint32_t id : affected) {
+    const auto member = members_.find(id);
+    for (const VoxelIndex& voxel : member->second->voxels) {
+      const bool is_frontier = field_.contains(voxel);
+      set_owner(voxel, is_frontier ? kPooled : kNoOwner);
+      if (is_frontier) {
+        pool.push_back(voxel);
+      }
+    }
+    members_.erase(member);
+  }
+  for (const VoxelIndex& voxel : change.added) {
+    set_owner(voxel, kPooled);
+    pool.push_back(voxel);
+  }
+  return pool;
+}
+
+// Takes the component out of the pool.
+std::vector<VoxelIndex> FrontierFinder::grow_component(const VoxelIndex& seed) {
+  std::vector<VoxelIndex> component{seed};
+  set_owner(seed, kNoOwner);
+  for (std::size_t next = 0; next < component.size(); ++next) {
+    const VoxelIndex voxel = component[next];
+    for_each_of_26_neighbours(voxel, [&](const VoxelIndex& neighbour) {
+      if (owner_of(neighbour) == kPooled) {
+        set_owner(neighbour, kNoOwner);
+        component.push_back(neighbour);
+      }
+    });
+  }
+  return component;
+}
+
+std::vector<std::uint32_t> FrontierFinder::form_clusters(const std::vector<VoxelIndex>& pool) {
+  std::vector<std::uint32_t> formed;
+  const double max_length_voxels = config_.max_cluster_length_m / geometry_.resolution_m();
+  for (const VoxelIndex& seed : pool) {
+    if (owner_of(seed) != kPooled) {
+      continue;
+    }
+    for (std::vector<VoxelIndex>& piece :
+         split_along_principal_axis(grow_component(seed), max_length_voxels)) {
+      Cluster cluster = make_cluster(std::move(piece), geometry_);
+      cluster.id = next_id_++;
+      for (const VoxelIndex& voxel : cluster.voxels) {
+        set_owner(voxel, cluster.id);
+      }
+      formed.push_back(cluster.id);
+      members_[cluster.id] = std::make_shared<const Cluster>(std::move(cluster));
+    }
+  }
+  return formed;
+}
+
+std::size_t FrontierFinder::neighbour_count(const Cluster& cluster) const {
+  std::size_t count = 0;
+  for (const auto& [id, other] : members_) {
+    if (id != cluster.id &&
+        other->voxels.size() >= static_cast<std::size_t>(config_.min_cluster_voxels) &&
+        are_neighbours(cluster, *other, config_.trails.neighbour_distance_m, geometry_)) {
+      ++count;
+    }
+  }
+  return count;
+}
+
+// Labels and viewpoints of what is new; labels of its neighbours; another try for the dormant.
+void FrontierFinder::refresh(const ClearanceMap& map,
+                             const RouteSearch& routes,
+                             const Box3d& changed_m,
+                             const std::vector<std::uint32_t>& formed) {
+  const double label_reach_m = config_.trails.ring_m + config_.trails.neighbour_distance_m;
+  const double view_reach_m = config_.viewpoints.max_radius_m + map.max_distance_m();
+  for (auto& [id, member] : members_) {
+    if (member->voxels.size() < static_cast<std::size_t>(config_.min_cluster_voxels)) {
+      continue;
+    }
+    const bool is_new = std::binary_search(formed.begin(), formed.end(), id);
+    const double distance_m = changed_m.isEmpty() ? std::numeric_limits<double>::infinity()
+                                                  : changed_m.exteriorDistance(member->bounds_m);
+    const bool relabel = is_new || distance_m <= label_reach_m;
+    const bool resample = is_new || (member->is_dormant() && distance_m <= view_reach_m);
+    if (!relabel && !resample) {
+      continue;
+    }
+    Cluster cluster = *member;
+    if (relabel) {
+      const bool trail = neighbour_count(cluster) <= 1 ||
+                         is_surrounded_by_free_space(map.snapshot(), cluster, config_.trails);
+      cluster.label = trail ? ClusterLabel::kTrail : ClusterLabel::kFrontier;
+    }
+    if (resample) {
+      cluster.viewpoints = sampler_.sample(map, routes, cluster);
+    }
+    member = std::make_shared<const Cluster>(std::move(cluster));
+  }
+}
+
+const std::vector<ClusterPtr>& FrontierFinder::update(const ClearanceMap& map,
+                                                      const MapSnapshotPtr& snapshot,
+                                                      const RouteSearch& routes) {
+  const FrontierField::Change change = field_.update(snapshot);
+  const std::vector<std::uint32_t> formed = form_clusters(dissolve(change));
+  Box3d changed_m;
+  for (const TileSlot slot : change.tiles) {
+    const VoxelBox voxels = geometry_.voxels_of_slot(slot);
+    changed_m.extend(voxels.min.cast<double>() * geometry_.resolution_m());
+    changed_m.extend(voxels.end.cast<double>() * geometry_.resolution_m());
+  }
+  refresh(map, routes, changed_m, formed);
+  clusters_.clear();
+  for (const auto& [id, member] : members_) {
+    if (member->voxels.size() >= static_cast<std::size_t>(config_.min_cluster_voxels)) {
+      clusters_.push_back(member);
+    }
+  }
+  return clusters_;
+}
+
+double FrontierFinder::remaining_share(const std::vector<VoxelIndex>& voxels) const {
+  const auto remaining =
+      std::count_if(voxels.begin(), voxels.end(), [this](const VoxelIndex& voxel) {
+        return field_.contains(voxel);
+      });
+  return static_cast<double>(remaining) / static_cast<double>(voxels.size());
+}
+
+}  // namespace understory

@@ -1,0 +1,68 @@
+// Copyright 2026 the Understory authors
+// SPDX-License-Identifier: BSD-3-Clause
+//
+// Keeps the clusters of frontier voxels with their labels and viewpoints in step with the map, at
+// a cost that follows what changed, not what there is (Zhou et al. 2021, FUEL, section IV).
+// Clusters that no viewpoint can see are dormant: kept, and tried again when the map near them
+// changes. World frame, metres. One thread; cannot fail in flight.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <vector>
+
+#include "understory/frontier/cluster.hpp"
+#include "understory/frontier/frontier_config.hpp"
+#include "understory/frontier/frontier_field.hpp"
+#include "understory/frontier/viewpoint_sampler.hpp"
+
+namespace understory {
+
+class FrontierFinder {
+ public:
+  FrontierFinder(const FrontierConfig& config,
+                 const CameraConfig& camera,
+                 const GridGeometry& geometry);
+
+  // The clusters as of the clearance map's snapshot, ascending by id, dormant ones included.
+  const std::vector<ClusterPtr>& update(const ClearanceMap& map,
+                                        const MapSnapshotPtr& snapshot,
+                                        const RouteSearch& routes);
+
+  [[nodiscard]] const std::vector<ClusterPtr>& clusters() const { return clusters_; }
+
+  // Share of these voxels that is still frontier.
+  [[nodiscard]] double remaining_share(const std::vector<VoxelIndex>& voxels) const;
+  // Has so much of the cluster been seen that it is no longer worth a visit?
+  [[nodiscard]] bool is_seen(const Cluster& cluster) const {
+    return remaining_share(cluster.voxels) <= 1.0 - config_.seen_share;
+  }
+
+ private:
+  using Owners = std::array<std::uint32_t, kVoxelsPerTile>;
+
+  [[nodiscard]] std::uint32_t owner_of(const VoxelIndex& voxel) const;
+  void set_owner(const VoxelIndex& voxel, std::uint32_t owner);
+  std::vector<VoxelIndex> dissolve(const FrontierField::Change& change);
+  std::vector<std::uint32_t> form_clusters(const std::vector<VoxelIndex>& pool);
+  std::vector<VoxelIndex> grow_component(const VoxelIndex& seed);
+  void refresh(const ClearanceMap& map,
+               const RouteSearch& routes,
+               const Box3d& changed_m,
+               const std::vector<std::uint32_t>& formed);
+  [[nodiscard]] std::size_t neighbour_count(const Cluster& cluster) const;
+
+  FrontierConfig config_;
+  ViewpointSampler sampler_;
+  double max_range_m_;
+  GridGeometry geometry_;
+  FrontierField field_;
+  std::vector<std::unique_ptr<Owners>> owners_;  // cluster id per voxel
+  std::map<std::uint32_t, ClusterPtr> members_;  // all clusters, too small ones as well
+  std::uint32_t next_id_ = 2;                    // 0: no owner, 1: pooled
+  std::vector<ClusterPtr> clusters_;
+};
+
+}  // namespace understory

@@ -1,0 +1,152 @@
+// Copyright 2026 the Understory authors
+// SPDX-License-Identifier: BSD-3-Clause
+#include "understory/frontier/viewpoint_sampler.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace understory {
+namespace {
+
+constexpr std::size_t kSampledVoxels = 20;  // of a cluster, evenly spread over its list
+constexpr double kFovMargin = 0.95;         // a voxel at the very edge of the image does not count
+
+struct YawChoice {
+  double yaw_rad;
+  std::size_t in_view;
+};
+
+// The heading that has the most of these bearings in a window of this half width.
+YawChoice best_yaw(std::vector<double> bearings_rad, double half_width_rad) {
+  std::sort(bearings_rad.begin(), bearings_rad.end());
+  const std::size_t count = bearings_rad.size();
+  YawChoice best{bearings_rad.front(), 0};
+  for (std::size_t first = 0; first < count; ++first) {
+    std::size_t in_view = 1;
+    double spread_rad = 0.0;
+    while (in_view < count) {
+      const std::size_t next = first + in_view;
+      const double bearing =
+          bearings_rad[next % count] + (next >= count ? 2.0 * kPi : 0.0) - bearings_rad[first];
+      if (bearing > 2.0 * half_width_rad) {
+        break;
+      }
+      spread_rad = bearing;
+      ++in_view;
+    }
+    if (in_view > best.in_view) {
+      best = {wrap_angle(bearings_rad[first] + 0.5 * spread_rad), in_view};
+    }
+  }
+  return best;
+}
+
+}  // namespace
+
+bool line_is_free(const ClearanceMap& map, const Vector3d& from_m, const Vector3d& to_m) {
+  const GridGeometry& geometry = map.geometry();
+  const double length_m = (to_m - from_m).norm();
+  const double step_m = geometry.resolution_m();
+  const Vector3d direction = (to_m - from_m) / std::max(length_m, 1e-9);
+  double travelled_m = 0.0;
+  while (travelled_m < length_m) {
+    const int squared =
+        map.squared_distance_voxels(geometry.index_of(from_m + travelled_m * direction));
+    if (squared == 0) {
+      return false;
+    }
+    // Nothing blocks nearer than the distance to the nearest centre less a voxel's diagonal.
+    const double safe_voxels = std::sqrt(static_cast<double>(squared)) - 1.75;
+    travelled_m += step_m * std::max(safe_voxels, 0.9);
+  }
+  return map.squared_distance_voxels(geometry.index_of(to_m)) > 0;
+}
+
+ViewpointSampler::ViewpointSampler(const ViewpointConfig& config, const CameraConfig& camera)
+    : config_(config),
+      half_horizontal_fov_rad_(0.5 * kFovMargin * camera.horizontal_fov_rad),
+      vertical_slope_(std::tan(0.5 * kFovMargin * camera.vertical_fov_rad)),
+      max_range_m_(kFovMargin * camera.max_range_m) {
+  if (config.min_radius_m > config.max_radius_m) {
+    throw ConfigError("frontier.viewpoints.min_radius_m: larger than max_radius_m");
+  }
+}
+
+std::vector<RouteLattice::Node> ViewpointSampler::candidates(const ClearanceMap& map,
+                                                             const RouteSearch& routes,
+                                                             const Cluster& cluster) const {
+  const RouteLattice& lattice = routes.lattice();
+  const int layers = lattice.count().z();
+  std::vector<std::size_t> indices;
+  for (double radius_m = config_.min_radius_m; radius_m <= config_.max_radius_m + 1e-6;
+       radius_m += config_.radius_step_m) {
+    for (double angle_rad = 0.0; angle_rad < 2.0 * kPi - 1e-6;
+         angle_rad += config_.angle_step_rad) {
+      const Vector3d point =
+          cluster.mean_m + radius_m * Vector3d(std::cos(angle_rad), std::sin(angle_rad), 0.0);
+      const RouteLattice::Node middle = lattice.nearest(point);
+      for (int layer = std::max(middle.z() - 1, 0); layer <= std::min(middle.z() + 1, layers - 1);
+           ++layer) {
+        const RouteLattice::Node node(middle.x(), middle.y(), layer);
+        if (routes.passable(map, node) &&
+            map.clearance_at_least(lattice.point_of(node), config_.unknown_distance_m)) {
+          indices.push_back(lattice.index_of(node));
+        }
+      }
+    }
+  }
+  std::sort(indices.begin(), indices.end());
+  indices.erase(std::unique(indices.begin(), indices.end()), indices.end());
+  std::vector<RouteLattice::Node> nodes;
+  nodes.reserve(indices.size());
+  for (const std::size_t index : indices) {
+    nodes.push_back(lattice.node_of_index(index));
+  }
+  return nodes;
+}
+
+bool ViewpointSampler::sees(const ClearanceMap& map,
+                            const Vector3d& from_m,
+                            const Vector3d& to_m) const {
+  const Vector3d ray = to_m - from_m;
+  const double horizontal_m = ray.head<2>().norm();
+  return ray.norm() <= max_range_m_ && std::abs(ray.z()) <= vertical_slope_ * horizontal_m &&
+         line_is_free(map, from_m, to_m);
+}
+
+std::vector<Viewpoint> ViewpointSampler::sample(const ClearanceMap& map,
+                                                const RouteSearch& routes,
+                                                const Cluster& cluster) const {
+  std::vector<Vector3d> sampled;
+  const std::size_t count = std::min(cluster.voxels.size(), kSampledVoxels);
+  for (std::size_t i = 0; i < count; ++i) {
+    sampled.push_back(map.geometry().center_of(cluster.voxels[i * cluster.voxels.size() / count]));
+  }
+  std::vector<Viewpoint> viewpoints;
+  for (const RouteLattice::Node& node : candidates(map, routes, cluster)) {
+    const Vector3d position = routes.lattice().point_of(node);
+    std::vector<double> bearings;
+    for (const Vector3d& voxel : sampled) {
+      if (sees(map, position, voxel)) {
+        bearings.push_back(std::atan2(voxel.y() - position.y(), voxel.x() - position.x()));
+      }
+    }
+    if (bearings.empty()) {
+      continue;
+    }
+    const YawChoice yaw = best_yaw(std::move(bearings), half_horizontal_fov_rad_);
+    const double coverage = static_cast<double>(yaw.in_view) / static_cast<double>(count);
+    if (coverage >= config_.min_coverage) {
+      viewpoints.push_back({node, position, yaw.yaw_rad, coverage});
+    }
+  }
+  std::stable_sort(viewpoints.begin(),
+                   viewpoints.end(),
+                   [](const Viewpoint& a, const Viewpoint& b) { return a.coverage > b.coverage; });
+  if (viewpoints.size() > static_cast<std::size_t>(config_.max_kept)) {
+    viewpoints.resize(static_cast<std::size_t>(config_.max_kept));
+  }
+  return viewpoints;
+}
+
+}  // namespace understory

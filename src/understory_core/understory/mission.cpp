@@ -1,0 +1,211 @@
+// Copyright 2026 the Understory authors
+// SPDX-License-Identifier: BSD-3-Clause
+#include "understory/mission.hpp"
+
+#include <algorithm>
+#include <limits>
+
+namespace understory {
+namespace {
+
+constexpr int kMaxFailedLegs = 20;
+constexpr double kArrivedM = 0.25;
+constexpr double kRetryIntervalS = 0.5;
+constexpr double kHeadroomM = 0.5;
+
+}  // namespace
+
+const char* to_string(MissionState state) {
+  switch (state) {
+    case MissionState::kTakeOff:
+      return "take_off";
+    case MissionState::kExplore:
+      return "explore";
+    case MissionState::kReturnHome:
+      return "return_home";
+    case MissionState::kDescend:
+      return "descend";
+    case MissionState::kLand:
+      return "land";
+    case MissionState::kStopped:
+      return "stopped";
+  }
+  return "?";
+}
+
+const char* to_string(StopReason reason) {
+  switch (reason) {
+    case StopReason::kNone:
+      return "none";
+    case StopReason::kNothingLeft:
+      return "nothing_left";
+    case StopReason::kTimeLimit:
+      return "time_limit";
+    case StopReason::kInterrupted:
+      return "interrupted";
+    case StopReason::kTakeOffFailed:
+      return "take_off_failed";
+  }
+  return "?";
+}
+
+Mission::Mission(const MissionConfig& config,
+                 const ExplorerConfig& explorer,
+                 const GridGeometry& geometry,
+                 const Vector3d& home_m,
+                 double yaw_rad,
+                 Time now)
+    : config_(config),
+      explorer_config_(explorer),
+      pilot_(explorer.plan, duration_from_seconds(explorer.replan.lead_s)),
+      explorer_(explorer, geometry),
+      home_m_(home_m),
+      home_yaw_rad_(yaw_rad) {
+  if (!geometry.box_m().contains(home_m)) {
+    throw ConfigError("start: lies outside the exploration box");
+  }
+  pilot_.take_position(home_m, yaw_rad, now);
+}
+
+Box3d Mission::launch_site_m() const {
+  const double radius_m = config_.launch_site_radius_m;
+  const double top_m = std::max(config_.take_off_height_m, home_m_.z()) + kHeadroomM;
+  return {home_m_ - Vector3d(radius_m, radius_m, home_m_.z()),
+          Vector3d(home_m_.x() + radius_m, home_m_.y() + radius_m, top_m)};
+}
+
+void Mission::end_exploration(StopReason reason, Time now) {
+  reason_ = reason;
+  explored_at_ = now;
+  state_ = config_.return_home && reason == StopReason::kNothingLeft ? MissionState::kReturnHome
+                                                                     : MissionState::kStopped;
+}
+
+void Mission::stop(StopReason reason, Time now) {
+  if (!pilot_.is_at_rest(now)) {
+    // Without a braking trajectory the flown one stands, which ends at rest as well.
+    static_cast<void>(pilot_.brake(now).has_value());
+  }
+  if (reason_ == StopReason::kNone) {
+    end_exploration(reason, now);
+  }
+  state_ = MissionState::kStopped;
+}
+
+// Straight there; null and counted when there is no checked trajectory.
+TrajectoryPtr Mission::fly_leg(const Vector3d& to_m, Time now) {
+  last_leg_ = now;
+  const Result<TrajectoryPtr, PlanError> flown =
+      pilot_.fly({{pilot_.next_start_point(now).position_m, to_m},
+                  pilot_.next_start_point(now).yaw_rad,
+                  FlightMode::kTransit,
+                  explorer_config_.limits.limits_for(FlightMode::kExplorer)},
+                 now);
+  failed_legs_ = flown ? 0 : failed_legs_ + 1;
+  return flown ? *flown : nullptr;
+}
+
+TrajectoryPtr Mission::climb(Time now) {
+  if (!pilot_.is_at_rest(now) || to_seconds(now - last_leg_) < kRetryIntervalS) {
+    return nullptr;
+  }
+  const Vector3d here = pilot_.next_start_point(now).position_m;
+  if (here.z() > config_.take_off_height_m - kArrivedM) {
+    state_ = MissionState::kExplore;
+    return nullptr;
+  }
+  TrajectoryPtr leg = fly_leg({here.x(), here.y(), config_.take_off_height_m}, now);
+  if (failed_legs_ >= kMaxFailedLegs) {
+    end_exploration(StopReason::kTakeOffFailed, now);
+  }
+  return leg;
+}
+
+TrajectoryPtr Mission::fly_home(Time now) {
+  const TrajectoryPoint here = pilot_.next_start_point(now);
+  const bool is_home = (here.position_m - home_m_).head<2>().norm() < kArrivedM;
+  if (failed_legs_ >= kMaxFailedLegs || (pilot_.is_at_rest(now) && is_home)) {
+    state_ = MissionState::kDescend;
+    failed_legs_ = 0;
+    return nullptr;
+  }
+  const double waited_s = to_seconds(now - last_leg_);
+  const bool in_danger = !pilot_.is_at_rest(now) && pilot_.unsafe_from(now).has_value();
+  const bool is_due = pilot_.is_at_rest(now) ? waited_s >= kRetryIntervalS
+                                             : waited_s >= explorer_config_.replan.max_interval_s;
+  TrajectoryPtr leg;
+  if (in_danger || is_due) {
+    last_leg_ = now;
+    RouteSearch& routes = explorer_.routes();
+    const RouteLattice::Node home = routes.lattice().nearest(home_m_);
+    routes.run(
+        pilot_.clearance(), here.position_m, {home}, std::numeric_limits<double>::infinity());
+    std::vector<Vector3d> route = routes.route_m(home);
+    if (!route.empty()) {
+      const Result<TrajectoryPtr, PlanError> flown =
+          pilot_.fly({std::move(route),
+                      home_yaw_rad_,
+                      FlightMode::kTransit,
+                      explorer_config_.limits.limits_for(FlightMode::kTransit)},
+                     now);
+      leg = flown ? *flown : nullptr;
+    }
+    failed_legs_ = leg || !pilot_.is_at_rest(now) ? 0 : failed_legs_ + 1;
+  }
+  if (in_danger && !leg) {
+    const Result<TrajectoryPtr, PlanError> braked = pilot_.brake(now);
+    leg = braked ? *braked : nullptr;
+  }
+  return leg;
+}
+
+TrajectoryPtr Mission::descend(Time now) {
+  if (!pilot_.is_at_rest(now)) {
+    return nullptr;
+  }
+  const Vector3d here = pilot_.next_start_point(now).position_m;
+  const PlanConfig& plan = explorer_config_.plan;
+  const double resolution_m = explorer_config_.map.resolution_m;
+  const double lowest_m = pilot_.clearance().geometry().box_m().min().z() + plan.vehicle_radius_m +
+                          plan.margin_m + resolution_m;
+  if (here.z() < lowest_m + kArrivedM || failed_legs_ >= kMaxFailedLegs) {
+    state_ = MissionState::kLand;
+    return nullptr;
+  }
+  return to_seconds(now - last_leg_) < kRetryIntervalS
+             ? nullptr
+             : fly_leg({here.x(), here.y(), lowest_m}, now);
+}
+
+MissionStep Mission::on_map(const MapSnapshotPtr& snapshot, Time now) {
+  MissionStep step;
+  pilot_.update_map(snapshot);
+  explorer_.observe(pilot_, snapshot);
+  if (reason_ == StopReason::kNone && to_seconds(now) >= config_.time_limit_s) {
+    stop(StopReason::kTimeLimit, now);
+  }
+  switch (state_) {
+    case MissionState::kTakeOff:
+      step.published = climb(now);
+      break;
+    case MissionState::kExplore:
+      step.explore = explorer_.step(pilot_, now);
+      step.published = step.explore.published;
+      if (step.explore.status == ExploreStatus::kNothingLeft && !step.published) {
+        end_exploration(StopReason::kNothingLeft, now);
+      }
+      break;
+    case MissionState::kReturnHome:
+      step.published = fly_home(now);
+      break;
+    case MissionState::kDescend:
+      step.published = descend(now);
+      break;
+    case MissionState::kLand:
+    case MissionState::kStopped:
+      break;
+  }
+  return step;
+}
+
+}  // namespace understory

@@ -1,0 +1,108 @@
+// Copyright 2026 the Understory authors
+// SPDX-License-Identifier: BSD-3-Clause
+//
+// The mission around the exploration: take off, explore until nothing is left, return home, land.
+// World frame, SI units. Called with every map update, on one thread; deterministic; nothing throws
+// in flight. Every phase is bounded: what cannot be flown after a number of tries ends the mission
+// where the vehicle is, at rest in known free space.
+#pragma once
+
+#include <cstdint>
+
+#include "understory/explorer.hpp"
+
+namespace understory {
+
+struct MissionConfig {
+  double take_off_height_m = 1.0;
+  double launch_site_radius_m = 0.7;
+  double time_limit_s = 1500.0;
+  bool return_home = true;
+
+  void visit(FieldVisitor& f) {
+    f.field("take_off_height_m",
+            take_off_height_m,
+            in_range(0.2, 100.0),
+            "a vehicle that starts lower climbs to this height first");
+    f.field("launch_site_radius_m",
+            launch_site_radius_m,
+            in_range(0.3, 5.0),
+            "the operator vouches that this much around the start is free, up to take-off height");
+    f.field("time_limit_s", time_limit_s, in_range(1.0, 1e6), "then the vehicle stops where it is");
+    f.field("return_home", return_home, "fly back to the start and land when nothing is left");
+  }
+};
+
+enum class MissionState : std::uint8_t {
+  kTakeOff,
+  kExplore,
+  kReturnHome,
+  kDescend,
+  kLand,
+  kStopped
+};
+[[nodiscard]] const char* to_string(MissionState state);
+
+enum class StopReason : std::uint8_t {
+  kNone,
+  kNothingLeft,
+  kTimeLimit,
+  kInterrupted,
+  kTakeOffFailed,
+};
+[[nodiscard]] const char* to_string(StopReason reason);
+
+struct MissionStep {
+  ExploreStep explore;
+  TrajectoryPtr published;
+};
+
+class Mission {
+ public:
+  // `home_m` is where the vehicle stands or hovers now, at rest.
+  Mission(const MissionConfig& config,
+          const ExplorerConfig& explorer,
+          const GridGeometry& geometry,
+          const Vector3d& home_m,
+          double yaw_rad,
+          Time now);
+
+  // To be marked free in the map before the first update.
+  [[nodiscard]] Box3d launch_site_m() const;
+
+  MissionStep on_map(const MapSnapshotPtr& snapshot, Time now);
+  // Brakes, and stays where it is.
+  void stop(StopReason reason, Time now);
+
+  [[nodiscard]] MissionState state() const { return state_; }
+  // kLand: the autopilot sets the vehicle down; kStopped: it hovers. Nothing more will be planned.
+  [[nodiscard]] bool is_over() const {
+    return state_ == MissionState::kLand || state_ == MissionState::kStopped;
+  }
+  [[nodiscard]] StopReason stop_reason() const { return reason_; }
+  // When exploration ended; meaningful once a stop reason is set.
+  [[nodiscard]] Time explored_at() const { return explored_at_; }
+  [[nodiscard]] const Pilot& pilot() const { return pilot_; }
+  [[nodiscard]] const Explorer& explorer() const { return explorer_; }
+
+ private:
+  void end_exploration(StopReason reason, Time now);
+  TrajectoryPtr climb(Time now);
+  TrajectoryPtr fly_home(Time now);
+  TrajectoryPtr descend(Time now);
+  TrajectoryPtr fly_leg(const Vector3d& to_m, Time now);
+
+  MissionConfig config_;
+  ExplorerConfig explorer_config_;
+  Pilot pilot_;
+  Explorer explorer_;
+  Vector3d home_m_;
+  double home_yaw_rad_;
+  MissionState state_ = MissionState::kTakeOff;
+  StopReason reason_ = StopReason::kNone;
+  Time explored_at_{};
+  Time last_leg_{};
+  int failed_legs_ = 0;
+};
+
+}  // namespace understory

@@ -1,0 +1,119 @@
+// Copyright 2026 the Understory authors
+// SPDX-License-Identifier: BSD-3-Clause
+#include "understory/plan/control_point_chain.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "understory/plan/trapezoid_profile.hpp"
+
+namespace understory {
+namespace {
+
+constexpr double kYawKnot_s = 0.1;
+// Keeps rounding, and a start that is at the limit already, from passing the real limits.
+constexpr double kLimitShare = 0.995;
+constexpr double kStandstill_mps = 1e-9;
+
+CubicBSpline<double> yaw_along(const TrapezoidProfile& profile,
+                               const std::array<double, 3>& first,
+                               double target_rad) {
+  CubicBSpline<double> yaw{{first.begin(), first.end()}, kYawKnot_s};
+  const int steps = static_cast<int>(std::ceil(profile.duration_s() / kYawKnot_s));
+  for (int i = 1; i < steps; ++i) {
+    yaw.control_points.push_back(first[2] + profile.position_at(i * kYawKnot_s));
+  }
+  yaw.control_points.insert(yaw.control_points.end(), 3, target_rad);
+  return yaw;
+}
+
+RateLimits yaw_limits(const Limits& limits) {
+  return {kLimitShare * limits.yaw_rate_radps, kLimitShare * limits.yaw_acceleration_radps2};
+}
+
+}  // namespace
+
+ControlPointChain::ControlPointChain(const CubicBSpline<Vector3d>::Sample& start,
+                                     const Limits& limits,
+                                     double knot_s)
+    : limits_(limits), knot_s_(knot_s) {
+  const std::array<Vector3d, 3> first = control_points_for<Vector3d>(start, knot_s);
+  points_m_.assign(first.begin(), first.end());
+  limits_.speed_mps *= kLimitShare;
+  limits_.acceleration_mps2 *= kLimitShare;
+}
+
+void ControlPointChain::step_towards(const Vector3d& wanted_mps) {
+  const Vector3d velocity = velocity_mps();
+  const double wanted_norm = wanted_mps.norm();
+  const double admitted = std::min(1.0, limits_.speed_mps / std::max(wanted_norm, kStandstill_mps));
+  Vector3d change = admitted * wanted_mps - velocity;
+  const double most_mps = limits_.acceleration_mps2 * knot_s_;
+  const double norm = change.norm();
+  if (norm > most_mps) {
+    change *= most_mps / norm;
+  }
+  points_m_.emplace_back(position_m() + (velocity + change) * knot_s_);
+}
+
+void ControlPointChain::step_braking(const Vector3d& direction) {
+  const Vector3d velocity = velocity_mps();
+  const double along_mps = direction.dot(velocity);
+  const double most_mps = limits_.acceleration_mps2 * knot_s_;
+  const double across_square = velocity.squaredNorm() - along_mps * along_mps;
+  const double spare_mps = std::sqrt(std::max(0.0, most_mps * most_mps - across_square));
+  step_towards(std::max(0.0, along_mps - spare_mps) * direction);
+}
+
+void ControlPointChain::stop() {
+  while (velocity_mps().norm() > kStandstill_mps) {
+    step_towards(Vector3d::Zero());
+  }
+  points_m_.push_back(position_m());
+}
+
+void ControlPointChain::append_leg(const Vector3d& to_m) {
+  const Vector3d from_m = position_m();
+  const double length_m = (to_m - from_m).norm();
+  const TrapezoidProfile profile(length_m, 0.0, {limits_.speed_mps, limits_.acceleration_mps2});
+  const int steps = static_cast<int>(std::ceil(profile.duration_s() / knot_s_));
+  for (int i = 1; i < steps; ++i) {
+    points_m_.emplace_back(from_m + profile.position_at(i * knot_s_) / length_m * (to_m - from_m));
+  }
+  points_m_.push_back(to_m);
+}
+
+CubicBSpline<Vector3d> ControlPointChain::finished() {
+  stop();
+  points_m_.insert(points_m_.end(), 2, Vector3d(position_m()));
+  return {points_m_, knot_s_};
+}
+
+CubicBSpline<double> yaw_spline(const CubicBSpline<double>::Sample& start,
+                                double goal_yaw_rad,
+                                const Limits& limits) {
+  const std::array<double, 3> first = control_points_for<double>(start, kYawKnot_s);
+  const double rate_radps = (first[2] - first[1]) / kYawKnot_s;
+  const double nearest_rad = first[2] + angle_difference(goal_yaw_rad, first[2]);
+  const auto profile_to = [&](double target_rad) {
+    return TrapezoidProfile(target_rad - first[2], rate_radps, yaw_limits(limits));
+  };
+  double target_rad = nearest_rad;
+  for (const double turn_rad : {-2.0 * kPi, 2.0 * kPi}) {
+    if (profile_to(nearest_rad + turn_rad).duration_s() < profile_to(target_rad).duration_s()) {
+      target_rad = nearest_rad + turn_rad;
+    }
+  }
+  return yaw_along(profile_to(target_rad), first, target_rad);
+}
+
+CubicBSpline<double> stopping_yaw_spline(const CubicBSpline<double>::Sample& start,
+                                         const Limits& limits) {
+  const std::array<double, 3> first = control_points_for<double>(start, kYawKnot_s);
+  const double rate_radps = (first[2] - first[1]) / kYawKnot_s;
+  const double turn_rad = stopping_distance(rate_radps, yaw_limits(limits).acceleration);
+  return yaw_along(
+      TrapezoidProfile(turn_rad, rate_radps, yaw_limits(limits)), first, first[2] + turn_rad);
+}
+
+}  // namespace understory

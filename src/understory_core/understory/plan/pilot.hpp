@@ -1,0 +1,72 @@
+// Copyright 2026 the Understory authors
+// SPDX-License-Identifier: BSD-3-Clause
+//
+// Keeps the vehicle on checked trajectories: plans from a little ahead of now on the one being
+// flown, checks what is flown against every new map, brakes when a check fails. Nothing unchecked
+// is ever handed out, and all that is handed out ends at rest in known free space. World frame, SI
+// units, one thread; in flight every failure is a value.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "understory/plan/trajectory_follower.hpp"
+#include "understory/plan/trajectory_planner.hpp"
+
+namespace understory {
+
+struct FlightGoal {
+  std::vector<Vector3d> route_m;  // from where the next trajectory starts
+  double yaw_rad = 0.0;
+  FlightMode mode = FlightMode::kExplorer;
+  Limits limits;
+};
+
+struct PilotCounters {
+  std::uint64_t plans = 0;
+  std::uint64_t failed_plans = 0;
+  std::uint64_t brakes = 0;
+  std::uint64_t failed_brakes = 0;
+  std::uint64_t unsafe_checks = 0;
+};
+
+class Pilot {
+ public:
+  Pilot(const PlanConfig& config, Duration lead);
+
+  // At rest here until told otherwise.
+  void take_position(const Vector3d& position_m, double yaw_rad, Time now);
+
+  void update_map(const MapSnapshotPtr& snapshot) { clearance_.update(snapshot); }
+  [[nodiscard]] const ClearanceMap& clearance() const { return clearance_; }
+
+  // Where a trajectory planned now begins.
+  [[nodiscard]] Time next_start(Time now) const { return now + lead_; }
+  [[nodiscard]] TrajectoryPoint next_start_point(Time now) const {
+    return follower_.sample(next_start(now));
+  }
+
+  // When what is being flown first comes too close to something, as the newest map has it.
+  [[nodiscard]] std::optional<Time> unsafe_from(Time now) const;
+
+  Result<TrajectoryPtr, PlanError> fly(const FlightGoal& goal, Time now);
+  Result<TrajectoryPtr, PlanError> brake(Time now);
+
+  [[nodiscard]] const TrajectoryFollower& follower() const { return follower_; }
+  [[nodiscard]] bool is_at_rest(Time now) const { return now >= follower_.newest()->end(); }
+  [[nodiscard]] const PilotCounters& counters() const { return counters_; }
+
+ private:
+  TrajectoryPtr accept(Trajectory trajectory, Time now);
+
+  PlanConfig config_;
+  Duration lead_;
+  TrajectoryPlanner planner_;
+  ClearanceMap clearance_;
+  TrajectoryFollower follower_;
+  PilotCounters counters_;
+  std::uint64_t next_id_ = 1;
+};
+
+}  // namespace understory

@@ -1,0 +1,202 @@
+// Copyright 2026 the Understory authors
+// SPDX-License-Identifier: BSD-3-Clause
+#include "understory/plan/trajectory_planner.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "understory/plan/clearance_rule.hpp"
+#include "understory/plan/control_point_chain.hpp"
+#include "understory/plan/kinodynamic_search.hpp"
+#include "understory/plan/route_guide.hpp"
+#include "understory/plan/spline_optimizer.hpp"
+
+namespace understory {
+namespace {
+
+constexpr double kKnot_s = 0.1;
+constexpr double kCoarseKnot_s = 0.2;
+constexpr Duration kSamplePeriod{10000};
+constexpr double kRelativeTolerance = 1e-6;
+constexpr double kRest = 1e-6;  // metres, m/s, m/s2, rad/s
+// The optimiser's limits are penalties: aim a little below the real ones.
+constexpr double kAimedShare = 0.985;
+// Trilinear distances are off by up to a third of a voxel from the exact test's.
+constexpr double kClearanceSlackVoxels = 0.35;
+
+using PositionSpline = CubicBSpline<Vector3d>;
+
+PositionSpline::Sample position_state(const TrajectoryPoint& point) {
+  return {point.position_m, point.velocity_mps, point.acceleration_mps2};
+}
+CubicBSpline<double>::Sample yaw_state(const TrajectoryPoint& point) {
+  return {point.yaw_rad, point.yaw_rate_radps, point.yaw_acceleration_radps2};
+}
+
+// A vehicle that is faster than a new mode allows cannot be slower at once.
+Limits limits_including(const Limits& limits, const TrajectoryPoint& start) {
+  Limits raised = limits;
+  raised.speed_mps = std::max(limits.speed_mps, start.velocity_mps.norm());
+  raised.acceleration_mps2 = std::max(limits.acceleration_mps2, start.acceleration_mps2.norm());
+  raised.yaw_rate_radps = std::max(limits.yaw_rate_radps, std::abs(start.yaw_rate_radps));
+  raised.yaw_acceleration_radps2 =
+      std::max(limits.yaw_acceleration_radps2, std::abs(start.yaw_acceleration_radps2));
+  return raised;
+}
+
+bool is_finite(const PlanRequest& request) {
+  const TrajectoryPoint& s = request.start;
+  return s.position_m.allFinite() && s.velocity_mps.allFinite() &&
+         s.acceleration_mps2.allFinite() && std::isfinite(s.yaw_rad) &&
+         std::isfinite(s.yaw_rate_radps) && std::isfinite(s.yaw_acceleration_radps2) &&
+         std::isfinite(request.goal_yaw_rad) &&
+         std::all_of(request.route_m.begin(), request.route_m.end(), [](const Vector3d& p) {
+           return p.allFinite();
+         });
+}
+
+// What every attempt at one request shares.
+struct Task {
+  const ClearanceMap& map;
+  PositionSpline::Sample start;
+  std::vector<Vector3d> vertices_m;  // shortcut route, from the start
+  ClearanceRule rule;
+  Limits limits;  // asked for
+};
+
+PositionSpline spline_through(const SampledMotion& motion, const Task& task) {
+  const double duration_s = motion.duration_s() + kCoarseKnot_s;
+  const auto pieces =
+      static_cast<std::size_t>(std::clamp(std::ceil(duration_s / kCoarseKnot_s), 5.0, 100.0));
+  PositionSpline spline;
+  spline.knot_s = duration_s / static_cast<double>(pieces);
+  const std::array<Vector3d, 3> first = control_points_for<Vector3d>(task.start, spline.knot_s);
+  spline.control_points.assign(first.begin(), first.end());
+  for (std::size_t i = 3; i < pieces; ++i) {
+    spline.control_points.push_back(motion.at(static_cast<double>(i - 1) * spline.knot_s));
+  }
+  spline.control_points.insert(spline.control_points.end(), 3, task.vertices_m.back());
+  return spline;
+}
+
+// In the order of preference; each is checked before the next is made.
+PositionSpline optimised(const Task& task, double preferred_clearance_m) {
+  const RouteGuide guide(task.vertices_m, task.start.first, task.limits);
+  const SampledMotion motion =
+      motion_along(task.map, guide, {task.start.value, task.start.first}, task.limits, task.rule);
+  Limits aimed = task.limits;
+  aimed.speed_mps *= kAimedShare;
+  aimed.acceleration_mps2 *= kAimedShare;
+  const double slack_m = kClearanceSlackVoxels * task.map.geometry().resolution_m();
+  const SplineTask spline_task{
+      task.start, aimed, task.rule.hard_m + slack_m, preferred_clearance_m};
+  const PositionSpline coarse = optimized_spline(
+      task.map, spline_task, spline_through(motion, task), {60, true, 20.0, 200.0});
+  return optimized_spline(task.map, spline_task, refined_spline(coarse), {50, true, 100.0, 2000.0});
+}
+
+PositionSpline stop_at_corners(const Task& task) {
+  ControlPointChain chain(task.start, task.limits, kKnot_s);
+  chain.stop();
+  for (const Vector3d& vertex : task.vertices_m) {
+    if ((vertex - chain.position_m()).norm() > kRest) {
+      chain.append_leg(vertex);
+    }
+  }
+  return chain.finished();
+}
+
+}  // namespace
+
+const char* to_string(PlanError error) {
+  switch (error) {
+    case PlanError::kStartBlocked:
+      return "start blocked";
+    case PlanError::kGoalBlocked:
+      return "goal blocked";
+    case PlanError::kNoRoute:
+      return "no route";
+    case PlanError::kLimits:
+      return "limits cannot be held";
+    case PlanError::kUnsafe:
+      return "no safe trajectory";
+    case PlanError::kBudgetSpent:
+      return "budget spent";
+  }
+  return "invalid plan error";
+}
+
+std::optional<Time> first_unsafe_time(const ClearanceMap& map,
+                                      const Trajectory& trajectory,
+                                      Time from,
+                                      double radius_m) {
+  return first_unsafe_time(map, trajectory, from, ClearanceRule{radius_m, radius_m});
+}
+
+bool within_limits(const Trajectory& trajectory) {
+  const Limits& limits = trajectory.limits;
+  const auto within = [](double value, double limit) {
+    return value <= limit * (1.0 + kRelativeTolerance) + 1e-12;
+  };
+  for (Time time = trajectory.start;; time += kSamplePeriod) {
+    const TrajectoryPoint point = trajectory.sample(time);
+    if (!within(point.velocity_mps.norm(), limits.speed_mps) ||
+        !within(point.acceleration_mps2.norm(), limits.acceleration_mps2) ||
+        !within(std::abs(point.yaw_rate_radps), limits.yaw_rate_radps) ||
+        !within(std::abs(point.yaw_acceleration_radps2), limits.yaw_acceleration_radps2)) {
+      return false;
+    }
+    if (time >= trajectory.end()) {
+      return point.velocity_mps.norm() < kRest && std::abs(point.yaw_rate_radps) < kRest;
+    }
+  }
+}
+
+Result<Trajectory, PlanError> TrajectoryPlanner::plan(const ClearanceMap& map,
+                                                      const PlanRequest& request) const {
+  if (request.route_m.empty() || !is_finite(request)) {
+    return PlanError::kNoRoute;
+  }
+  const Vector3d& start_m = request.start.position_m;
+  const double hard_m = config_.vehicle_radius_m + config_.margin_m;
+  const std::optional<ClearanceRule> rule =
+      clearance_rule_from(map, start_m, config_.vehicle_radius_m, hard_m);
+  if (!rule) {
+    return PlanError::kStartBlocked;
+  }
+  std::vector<Vector3d> route_m{start_m};
+  route_m.insert(route_m.end(), request.route_m.begin(), request.route_m.end());
+  Task task{map,
+            position_state(request.start),
+            shortcut_route(map, route_m, *rule, config_.horizon_m),
+            *rule,
+            request.limits};
+  if (!map.clearance_at_least(task.vertices_m.back(), hard_m)) {
+    return PlanError::kGoalBlocked;
+  }
+  Trajectory trajectory;
+  trajectory.start = request.start_time;
+  trajectory.mode = request.mode;
+  trajectory.limits = limits_including(request.limits, request.start);
+  trajectory.depth_stamp = map.snapshot().stamp;
+  trajectory.yaw = yaw_spline(yaw_state(request.start), request.goal_yaw_rad, request.limits);
+  PlanError error = PlanError::kUnsafe;
+  const auto accepted = [&](PositionSpline position) {
+    trajectory.position = std::move(position);
+    if (!within_limits(trajectory)) {
+      error = PlanError::kLimits;
+      return false;
+    }
+    return !first_unsafe_time(map, trajectory, trajectory.start, *rule);
+  };
+  if (task.vertices_m.size() > 1 && accepted(optimised(task, config_.preferred_clearance_m))) {
+    return trajectory;
+  }
+  if (accepted(stop_at_corners(task))) {
+    return trajectory;
+  }
+  return error;
+}
+
+}  // namespace understory

@@ -1,0 +1,152 @@
+// Copyright 2026 the Understory authors
+// SPDX-License-Identifier: BSD-3-Clause
+#include "understory/strategy/explorer_collector.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace understory {
+namespace {
+
+// The candidate with the least cost among those admitted; the first of equals.
+template <class Admit, class Cost>
+std::optional<Candidate> cheapest(const std::vector<Candidate>& candidates,
+                                  const Admit& admit,
+                                  const Cost& cost) {
+  const Candidate* best = nullptr;
+  double least = std::numeric_limits<double>::infinity();
+  for (const Candidate& candidate : candidates) {
+    if (!admit(candidate)) {
+      continue;
+    }
+    const double candidate_cost = cost(candidate);
+    if (candidate_cost < least) {
+      least = candidate_cost;
+      best = &candidate;
+    }
+  }
+  return best == nullptr ? std::nullopt : std::make_optional(*best);
+}
+
+bool is_same_target(const ClusterPtr& target, const Candidate& candidate) {
+  // Clusters are made anew when they change; the border they stand for stays where it is.
+  constexpr double kSamePlaceM = 0.5;
+  return target != nullptr &&
+         (target->mean_m - candidate.cluster->mean_m).squaredNorm() < kSamePlaceM * kSamePlaceM;
+}
+
+}  // namespace
+
+double ExplorerCollector::near_radius_m(FlightMode mode) const {
+  const double factor = mode == FlightMode::kCollector ? config_.mode.leave_factor : 1.0;
+  return factor * config_.mode.near_radius_m;
+}
+
+FlightMode ExplorerCollector::select_mode(const StrategyInput& input) const {
+  const double radius_m = near_radius_m(input.mode);
+  int near_trails = 0;
+  const Cluster* counted = nullptr;
+  for (const Candidate& candidate : input.candidates) {
+    if (candidate.cluster.get() != counted && candidate.cluster->is_trail() &&
+        candidate.route_length_m <= radius_m) {
+      counted = candidate.cluster.get();
+      ++near_trails;
+    }
+  }
+  const int needed = input.mode == FlightMode::kCollector ? 1 : config_.mode.min_near_trails;
+  return near_trails >= needed ? FlightMode::kCollector : FlightMode::kExplorer;
+}
+
+double ExplorerCollector::turn_angle(const StrategyInput& input, const Vector3d& position_m) const {
+  const Vector3d to_target = position_m - input.vehicle.position_m;
+  const double speed_mps = input.vehicle.velocity_mps.norm();
+  if (to_target.norm() < 1e-6) {
+    return 0.0;
+  }
+  // Eq. 2 has no direction at hover; there the heading is where the vehicle can go on.
+  const Vector3d direction =
+      speed_mps >= config_.explorer.min_heading_speed_mps
+          ? Vector3d(input.vehicle.velocity_mps / speed_mps)
+          : Vector3d(std::cos(input.vehicle.yaw_rad), std::sin(input.vehicle.yaw_rad), 0.0);
+  return std::acos(std::clamp(direction.dot(to_target.normalized()), -1.0, 1.0));
+}
+
+double ExplorerCollector::greedy_cost(const Candidate& candidate) const {
+  const ExplorerCostConfig& weights = config_.explorer;
+  const double label_cost = candidate.cluster->is_trail() ? weights.trail_penalty : 0.0;
+  return weights.distance_weight * candidate.route_length_m + weights.label_weight * label_cost;
+}
+
+double ExplorerCollector::explorer_cost(const StrategyInput& input,
+                                        const Candidate& candidate) const {
+  return greedy_cost(candidate) +
+         config_.explorer.direction_weight * turn_angle(input, candidate.viewpoint.position_m);
+}
+
+double ExplorerCollector::collector_cost(const StrategyInput& input,
+                                         const Candidate& candidate) const {
+  const double path_time_s = candidate.route_length_m / rates_.collector_speed_mps;
+  const double yaw_time_s =
+      std::abs(angle_difference(candidate.viewpoint.yaw_rad, input.vehicle.yaw_rad)) /
+      rates_.yaw_rate_radps;
+  return config_.collector.path_weight * path_time_s + config_.collector.yaw_weight * yaw_time_s;
+}
+
+std::optional<Candidate> ExplorerCollector::choose_as_explorer(const StrategyInput& input) const {
+  const ExplorerCostConfig& settings = config_.explorer;
+  const auto kept = [&](const Candidate& candidate, double cost) {
+    return is_same_target(input.target, candidate) ? cost - config_.keep_target_bonus : cost;
+  };
+  const auto distance_m = [&](const Candidate& candidate) {
+    return (candidate.viewpoint.position_m - input.vehicle.position_m).norm();
+  };
+  std::optional<Candidate> ahead = cheapest(
+      input.candidates,
+      [&](const Candidate& candidate) {
+        return distance_m(candidate) <= settings.ahead_distance_m &&
+               turn_angle(input, candidate.cluster->mean_m) <= settings.ahead_angle_rad;
+      },
+      [&](const Candidate& candidate) { return kept(candidate, explorer_cost(input, candidate)); });
+  if (ahead) {
+    return ahead;
+  }
+  std::optional<Candidate> near = cheapest(
+      input.candidates,
+      [&](const Candidate& candidate) {
+        return distance_m(candidate) <= settings.greedy_distance_m;
+      },
+      [&](const Candidate& candidate) { return kept(candidate, greedy_cost(candidate)); });
+  if (near || !input.is_complete) {
+    return near;
+  }
+  return cheapest(
+      input.candidates,
+      [](const Candidate&) { return true; },
+      [&](const Candidate& candidate) { return kept(candidate, candidate.route_length_m); });
+}
+
+std::optional<Candidate> ExplorerCollector::choose_as_collector(const StrategyInput& input) const {
+  const double radius_m = near_radius_m(input.mode);
+  return cheapest(
+      input.candidates,
+      [&](const Candidate& candidate) {
+        return candidate.cluster->is_trail() && candidate.route_length_m <= radius_m;
+      },
+      [&](const Candidate& candidate) {
+        const double cost = collector_cost(input, candidate);
+        return is_same_target(input.target, candidate) ? cost - config_.keep_target_bonus : cost;
+      });
+}
+
+std::optional<Target> ExplorerCollector::choose(const StrategyInput& input) const {
+  const FlightMode mode = select_mode(input);
+  const std::optional<Candidate> candidate =
+      mode == FlightMode::kCollector ? choose_as_collector(input) : choose_as_explorer(input);
+  if (!candidate) {
+    return std::nullopt;
+  }
+  return Target{*candidate, mode};
+}
+
+}  // namespace understory

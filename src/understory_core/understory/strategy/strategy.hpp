@@ -1,0 +1,49 @@
+// Copyright 2026 the Understory authors
+// SPDX-License-Identifier: BSD-3-Clause
+//
+// The seam between exploration strategies and everything else: what a strategy is given, and what
+// it answers. World frame, SI units. One thread; deterministic; "nothing left" is an answer.
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "understory/frontier/cluster.hpp"
+#include "understory/plan/trajectory.hpp"
+
+namespace understory {
+
+// A viewpoint that can be reached now, and how far it is to fly.
+struct Candidate {
+  ClusterPtr cluster;
+  Viewpoint viewpoint;
+  double route_length_m;
+};
+
+struct StrategyInput {
+  std::vector<Candidate> candidates;  // by cluster id, then best coverage first
+  bool is_complete = false;  // false: only what is near was searched, more may be reachable
+  TrajectoryPoint vehicle;   // where the next trajectory starts
+  FlightMode mode = FlightMode::kExplorer;  // so far
+  ClusterPtr target;                        // so far; null: none
+};
+
+struct Target {
+  Candidate candidate;
+  FlightMode mode;
+};
+
+class Strategy {
+ public:
+  Strategy() = default;
+  Strategy(const Strategy&) = delete;
+  Strategy& operator=(const Strategy&) = delete;
+  virtual ~Strategy() = default;
+
+  // Nothing: of these candidates none is worth flying to. If the input was not complete, the same
+  // question is asked again with all there is.
+  [[nodiscard]] virtual std::optional<Target> choose(const StrategyInput& input) const = 0;
+};
+
+}  // namespace understory

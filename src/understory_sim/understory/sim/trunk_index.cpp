@@ -1,0 +1,152 @@
+// Copyright 2026 the Understory authors
+// SPDX-License-Identifier: BSD-3-Clause
+#include "understory/sim/trunk_index.hpp"
+
+#include <algorithm>
+#include <cassert>
+
+namespace understory {
+namespace {
+
+constexpr double kFinestCell_m = 1.0;
+constexpr double kCellsPerTrunk = 8.0;
+constexpr double kCellsAtLeast = 4096.0;
+
+Box2d disc_box(const Trunk& trunk) {
+  const Vector2d reach = Vector2d::Constant(trunk.radius_m);
+  return {trunk.center_m - reach, trunk.center_m + reach};
+}
+
+double squared_distance(const Vector2d& point, const Box2d& box) {
+  return box.squaredExteriorDistance(point);
+}
+
+}  // namespace
+
+TrunkIndex::TrunkIndex(const std::vector<Trunk>& trunks) {
+  if (trunks.empty()) {
+    return;
+  }
+  Box2d extent;
+  for (const Trunk& trunk : trunks) {
+    assert(trunk.center_m.allFinite() && trunk.radius_m > 0.0);
+    extent.extend(disc_box(trunk));
+  }
+  // A stray trunk far away makes cells coarser instead of the table huge.
+  const double most_cells =
+      std::max(kCellsAtLeast, kCellsPerTrunk * static_cast<double>(trunks.size()));
+  cell_m_ = std::max(kFinestCell_m, std::sqrt(extent.volume() / most_cells));
+  cell_m_ = std::max(cell_m_, extent.sizes().maxCoeff() / most_cells);
+  origin_m_ = extent.min();
+  count_x_ = static_cast<int>(extent.sizes().x() / cell_m_) + 1;
+  count_y_ = static_cast<int>(extent.sizes().y() / cell_m_) + 1;
+
+  const auto for_each_cell = [&](const Trunk& trunk, const auto& action) {
+    const Vector2d low = trunk.center_m - origin_m_;
+    const int x_end = cell_along(low.x() + trunk.radius_m, count_x_);
+    const int y_end = cell_along(low.y() + trunk.radius_m, count_y_);
+    for (int cy = cell_along(low.y() - trunk.radius_m, count_y_); cy <= y_end; ++cy) {
+      for (int cx = cell_along(low.x() - trunk.radius_m, count_x_); cx <= x_end; ++cx) {
+        action(static_cast<std::size_t>(cy) * static_cast<std::size_t>(count_x_) +
+               static_cast<std::size_t>(cx));
+      }
+    }
+  };
+  first_.assign(static_cast<std::size_t>(count_x_) * static_cast<std::size_t>(count_y_) + 1, 0);
+  for (const Trunk& trunk : trunks) {
+    for_each_cell(trunk, [&](std::size_t cell) { ++first_[cell + 1]; });
+  }
+  for (std::size_t cell = 1; cell < first_.size(); ++cell) {
+    first_[cell] += first_[cell - 1];
+  }
+  discs_.resize(first_.back());
+  std::vector<std::uint32_t> next(first_.begin(), first_.end() - 1);
+  for (std::size_t i = 0; i < trunks.size(); ++i) {
+    const Trunk& trunk = trunks[i];
+    for_each_cell(trunk, [&](std::size_t cell) {
+      discs_[next[cell]++] = {trunk.center_m.x(), trunk.center_m.y(), trunk.radius_m, i};
+    });
+  }
+}
+
+int TrunkIndex::cell_along(double offset_m, int count) const {
+  return static_cast<int>(std::clamp(offset_m / cell_m_, 0.0, static_cast<double>(count - 1)));
+}
+
+double TrunkIndex::nearest_in_cell(int cx, int cy, const Vector2d& p, double best_m) const {
+  const std::size_t cell = static_cast<std::size_t>(cy) * static_cast<std::size_t>(count_x_) +
+                           static_cast<std::size_t>(cx);
+  for (std::uint32_t i = first_[cell]; i < first_[cell + 1]; ++i) {
+    const Disc& disc = discs_[i];
+    const double dx = p.x() - disc.x_m;
+    const double dy = p.y() - disc.y_m;
+    best_m = std::min(best_m, std::sqrt(dx * dx + dy * dy) - disc.radius_m);
+  }
+  return best_m;
+}
+
+// The cells at Chebyshev distance `ring` from the point's own, as far as they exist.
+double TrunkIndex::nearest_in_ring(int ring, const Vector2d& p, double best_m) const {
+  const int px = cell_along(p.x() - origin_m_.x(), count_x_);
+  const int py = cell_along(p.y() - origin_m_.y(), count_y_);
+  for (int cy = std::max(0, py - ring); cy <= std::min(count_y_ - 1, py + ring); ++cy) {
+    const bool whole_row = cy == py - ring || cy == py + ring;
+    const int step = whole_row || ring == 0 ? 1 : 2 * ring;
+    for (int cx = px - ring; cx <= px + ring; cx += step) {
+      if (cx >= 0 && cx < count_x_) {
+        best_m = nearest_in_cell(cx, cy, p, best_m);
+      }
+    }
+  }
+  return best_m;
+}
+
+double TrunkIndex::distance_m(const Vector2d& point_m, double max_m) const {
+  if (discs_.empty()) {
+    return max_m;
+  }
+  // Measured from the point's projection into the grid, ring k is at least `margin + (k - 1) cells`
+  // away; the true distance is never less.
+  const Vector2d offset = point_m - origin_m_;
+  const Box2d grid(Vector2d::Zero(), Vector2d(count_x_, count_y_) * cell_m_);
+  const double outside_m = std::sqrt(squared_distance(offset, grid));
+  if (outside_m >= max_m) {
+    return max_m;
+  }
+  const double in_cell_x = offset.x() - cell_along(offset.x(), count_x_) * cell_m_;
+  const double in_cell_y = offset.y() - cell_along(offset.y(), count_y_) * cell_m_;
+  const double margin_m =
+      std::max(0.0, std::min({in_cell_x, in_cell_y, cell_m_ - in_cell_x, cell_m_ - in_cell_y}));
+  double best_m = nearest_in_ring(0, point_m, max_m);
+  const int rings = std::max(count_x_, count_y_);
+  for (int ring = 1; ring < rings && best_m > margin_m + (ring - 1) * cell_m_; ++ring) {
+    best_m = nearest_in_ring(ring, point_m, best_m);
+  }
+  return best_m;
+}
+
+std::vector<std::size_t> TrunkIndex::touching(const Box2d& rectangle_m) const {
+  std::vector<std::size_t> found;
+  if (discs_.empty() || rectangle_m.isEmpty()) {
+    return found;
+  }
+  const Vector2d low = rectangle_m.min() - origin_m_;
+  const Vector2d high = rectangle_m.max() - origin_m_;
+  for (int cy = cell_along(low.y(), count_y_); cy <= cell_along(high.y(), count_y_); ++cy) {
+    for (int cx = cell_along(low.x(), count_x_); cx <= cell_along(high.x(), count_x_); ++cx) {
+      const std::size_t cell = static_cast<std::size_t>(cy) * static_cast<std::size_t>(count_x_) +
+                               static_cast<std::size_t>(cx);
+      for (std::uint32_t i = first_[cell]; i < first_[cell + 1]; ++i) {
+        const Disc& disc = discs_[i];
+        if (squared_distance({disc.x_m, disc.y_m}, rectangle_m) <= disc.radius_m * disc.radius_m) {
+          found.push_back(disc.trunk);
+        }
+      }
+    }
+  }
+  std::sort(found.begin(), found.end());
+  found.erase(std::unique(found.begin(), found.end()), found.end());
+  return found;
+}
+
+}  // namespace understory
