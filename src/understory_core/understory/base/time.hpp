@@ -16,6 +16,7 @@ struct MissionClock {
   using period = std::micro;
   using duration = std::chrono::duration<rep, period>;
   using time_point = std::chrono::time_point<MissionClock, duration>;
+  // NOLINTNEXTLINE(readability-identifier-naming): a clock of the standard library has it
   static constexpr bool is_steady = true;
 };
 

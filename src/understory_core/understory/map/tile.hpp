@@ -38,6 +38,7 @@ struct Tile {
   std::array<std::uint16_t, kRowsPerTile> free_rows{};   // bit x set: free
   std::array<std::uint16_t, kRowsPerTile> known_rows{};  // bit x set: observed at least once
 
+  // NOLINTNEXTLINE(cppcoreguidelines-pro-type-member-init): filled once, not twice
   Tile() { log_odds.fill(kUnknownLogOdds); }
 
   [[nodiscard]] bool is_free(const VoxelIndex& voxel) const { return test(free_rows, voxel); }

@@ -1,0 +1,146 @@
+# Copyright 2026 the Understory authors
+# SPDX-License-Identifier: BSD-3-Clause
+"""The test command: every check and test of the project, with a summary at the end.
+
+Called by `understory test` once all packages are installed.
+"""
+
+import argparse
+import re
+import subprocess
+import sys
+import time
+import traceback
+
+import builds
+from catkin_check import check_catkin
+from commands import ROOT, cpp_files, say
+from python_tests import run_python_tests
+from results import SuiteResult, check_minimums, read_minimums, summary, totals
+from static_checks import check_format, check_shell
+from tidy import check_tidy
+
+QUICK_SUITES = ["format", "shell", "unit", "python"]
+SANITIZER_ENV = {
+    "ASAN_OPTIONS": "strict_string_checks=1:detect_stack_use_after_return=1",
+    "UBSAN_OPTIONS": "print_stacktrace=1",
+}
+THREADS = re.compile(r"^\s*#include <(thread|future|mutex|atomic|condition_variable|pthread\.h)>", re.M)
+
+
+def run_build_and_ctest(quick):
+    """(build folder or None, results)."""
+    say("\n== build: optimised, with assertions, warnings are errors")
+    began = time.monotonic()
+    folder = builds.build("build-test", builds.CHECKED, ["test_unit"] if quick else ["all"])
+    built = SuiteResult("build", passed=1, duration_s=time.monotonic() - began)
+    if folder is None:
+        built.passed, built.failed = 0, ["build-test does not compile"]
+        return None, [built]
+    say("\n== ctest: " + ("unit tests" if quick else "unit, bad input, property, scenario tests"))
+    return folder, [built] + guarded("ctest", builds.run_ctest, folder, "^unit$" if quick else "")
+
+
+def check_parameters(folder):
+    """docs/parameters.md must be what the program prints."""
+    say("\n== parameters: docs/parameters.md is current")
+    result = SuiteResult("parameters")
+    program = folder / "src/understory_sim/understory_simulate"
+    page = ROOT / "docs/parameters.md"
+    if not program.exists():
+        result.failed.append(f"{program} was not built")
+        return result
+    printed = subprocess.run(
+        [program, "--print-parameters"],
+        stdin=subprocess.DEVNULL,
+        capture_output=True,
+        encoding="utf-8",
+        timeout=60,
+        check=False,
+    )
+    if printed.returncode != 0 or not printed.stdout.strip():
+        result.failed.append(f"--print-parameters failed: {printed.stderr.strip()}")
+    elif not page.exists() or page.read_text(encoding="utf-8") != printed.stdout:
+        result.failed.append(
+            "docs/parameters.md is not current; write it anew with"
+            " `./understory simulate --print-parameters > docs/parameters.md`"
+        )
+    else:
+        result.passed = 1
+    return result
+
+
+def run_sanitized():
+    say("\n== asan: unit and bad-input tests under address and undefined-behaviour sanitizers")
+    options = builds.SANITIZED + ["-DUNDERSTORY_SANITIZE=address,undefined"]
+    began = time.monotonic()
+    folder = builds.build("build-asan-test", options, ["understory_sanitized_tests"])
+    if folder is None:
+        return [SuiteResult("unit-asan", failed=["build-asan-test does not compile"])]
+    results = builds.run_ctest(folder, "^(unit|bad_input)$", "-asan", SANITIZER_ENV)
+    say(f"  {time.monotonic() - began:.0f} s in all")
+    return results
+
+
+def run_thread_sanitized():
+    say("\n== tsan: unit tests under the thread sanitizer")
+    threaded = [
+        name
+        for name in cpp_files()
+        if not name.startswith("test/") and THREADS.search((ROOT / name).read_text("utf-8"))
+    ]
+    if not threaded:
+        say("  nothing to run: no file of ours uses threads, mutexes or atomics")
+        return []
+    say("  because of " + ", ".join(threaded))
+    options = builds.SANITIZED + ["-DUNDERSTORY_SANITIZE=thread"]
+    folder = builds.build("build-tsan-test", options, ["understory_sanitized_tests"])
+    if folder is None:
+        return [SuiteResult("unit-tsan", failed=["build-tsan-test does not compile"])]
+    return builds.run_ctest(folder, "^unit$", "-tsan", {"TSAN_OPTIONS": "halt_on_error=1"})
+
+
+def guarded(name, suite, *arguments):
+    """The suite's results as a list; a suite that breaks down is a failed one, not the end."""
+    try:
+        found = suite(*arguments)
+    except Exception:  # pylint: disable=broad-except
+        traceback.print_exc()
+        return [SuiteResult(name, failed=["broke down, see above"])]
+    return found if isinstance(found, list) else [found]
+
+
+def run_all(quick):
+    results = guarded("format", check_format) + guarded("shell", check_shell)
+    folder, built = run_build_and_ctest(quick)
+    results += built
+    results += guarded("python", run_python_tests)
+    if quick:
+        return results
+    if folder is not None:
+        results += guarded("parameters", check_parameters, folder)
+        results += guarded("clang-tidy", check_tidy, folder)
+    results += guarded("unit-asan", run_sanitized)
+    results += guarded("unit-tsan", run_thread_sanitized)
+    results += guarded("catkin", check_catkin)
+    return results
+
+
+def main():
+    parser = argparse.ArgumentParser(prog="understory test")
+    parser.add_argument("--quick", action="store_true")
+    quick = parser.parse_args().quick
+    began = time.monotonic()
+    results = run_all(quick)
+    minimums = read_minimums(ROOT / "test" / "expected_counts.txt")
+    check_minimums(results, minimums, QUICK_SUITES if quick else sorted(minimums))
+    say(f"\n== summary ({(time.monotonic() - began) / 60:.1f} minutes)")
+    say(summary(results))
+    return 1 if totals(results)[1] else 0
+
+
+if __name__ == "__main__":
+    try:
+        sys.exit(main())
+    except KeyboardInterrupt:
+        sys.exit(130)

@@ -1,0 +1,113 @@
+# Copyright 2026 the Understory authors
+# SPDX-License-Identifier: BSD-3-Clause
+"""clang-tidy over everything we compile, remembering what came out clean.
+
+A file is looked at again when its own text, that of any header it includes, its compile command,
+a .clang-tidy or clang-tidy itself changed: the cache key is a hash of all of these.
+"""
+
+import concurrent.futures
+import functools
+import hashlib
+import json
+import os
+import pathlib
+import shlex
+import subprocess
+import time
+
+from commands import ROOT, cpp_files, our_files, output_of, say
+from results import SuiteResult
+
+CACHE = pathlib.Path(os.environ.get("UNDERSTORY_TIDY_CACHE", ROOT / "build" / "tidy-cache"))
+WARNINGS_OF_GCC_ONLY = "-Wno-unknown-warning-option"
+
+
+@functools.lru_cache(maxsize=None)
+def _content_hash(path):
+    return hashlib.sha256(pathlib.Path(path).read_bytes()).hexdigest()
+
+
+def _included_files(folder):
+    """{object file: the files it was made from}, as Ninja recorded them."""
+    included, current = {}, None
+    for line in output_of(["ninja", "-C", folder, "-t", "deps"]).splitlines():
+        if line.startswith("    "):
+            current.append(os.path.normpath(folder / line.strip()))
+        elif line.endswith("(VALID)"):
+            current = included.setdefault(line.split(": #deps")[0], [])
+        elif line:
+            current = []  # stale: belongs to nothing we build now
+    return included
+
+
+def _object_file(entry):
+    words = shlex.split(entry["command"])
+    return words[words.index("-o") + 1]
+
+
+def _key(entry, files, version_and_rules):
+    digest = hashlib.sha256(version_and_rules.encode())
+    digest.update(entry["command"].replace(str(ROOT), "").encode())
+    for path in sorted(set(files)):
+        digest.update(f"{path.replace(str(ROOT), '')} {_content_hash(path)}\n".encode())
+    return digest.hexdigest()
+
+
+def _look_at(folder, entry, key):
+    """Runs clang-tidy over one file; returns what it says, empty if clean."""
+    outcome = subprocess.run(
+        ["clang-tidy", "-p", folder, "--quiet", f"--extra-arg={WARNINGS_OF_GCC_ONLY}"]
+        + [entry["file"]],
+        cwd=ROOT,
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        encoding="utf-8",
+        errors="replace",
+        check=False,
+    )
+    if outcome.returncode == 0 and not outcome.stdout.strip():
+        (CACHE / key).touch()
+        return ""
+    return outcome.stdout + outcome.stderr
+
+
+def check_tidy(folder):
+    """One SuiteResult; `folder` holds a finished build with compile_commands.json."""
+    say("\n== clang-tidy: static analysis of all C++ files")
+    began = time.monotonic()
+    result = SuiteResult("clang-tidy")
+    entries = json.loads((folder / "compile_commands.json").read_text(encoding="utf-8"))
+    entries = [entry for entry in entries if entry["file"].startswith(f"{ROOT}/")]
+    compiled = {os.path.relpath(entry["file"], ROOT) for entry in entries}
+    left_out = [name for name in cpp_files() if name.endswith(".cpp") and name not in compiled]
+    result.failed += [f"{name} is compiled by no target" for name in left_out]
+
+    rules = [name for name in our_files() if os.path.basename(name) == ".clang-tidy"]
+    version_and_rules = output_of(["clang-tidy", "--version"]) + "".join(
+        name + _content_hash(ROOT / name) for name in rules
+    )
+    CACHE.mkdir(parents=True, exist_ok=True)
+    included = _included_files(folder)
+    keys = {
+        entry["file"]: _key(entry, included[_object_file(entry)], version_and_rules)
+        for entry in entries
+    }
+    todo = [entry for entry in entries if not (CACHE / keys[entry["file"]]).exists()]
+    say(f"  {len(entries) - len(todo)} files are as they were when found clean, {len(todo)} to do")
+    with concurrent.futures.ThreadPoolExecutor(os.cpu_count() or 1) as pool:
+        runs = {
+            pool.submit(_look_at, folder, entry, keys[entry["file"]]): entry for entry in todo
+        }
+        for done, run in enumerate(concurrent.futures.as_completed(runs), 1):
+            name = os.path.relpath(runs[run]["file"], ROOT)
+            findings = run.result()
+            if findings:
+                result.failed.append(name)
+                say(f"\n-- FAILED: {name}\n{findings}")
+            if done % 10 == 0 or done == len(todo):
+                say(f"  {done} of {len(todo)}")
+    result.passed = len(entries) - len(result.failed) + len(left_out)
+    result.duration_s = time.monotonic() - began
+    return result
