@@ -3,9 +3,10 @@
 #include "support/plan_scene.hpp"
 
 #include <algorithm>
-#include <map>
+#include <cmath>
+#include <limits>
 #include <queue>
-#include <tuple>
+#include <utility>
 
 #include "understory/plan/clearance_rule.hpp"
 
@@ -15,69 +16,85 @@ namespace {
 constexpr double kLattice_m = 0.2;
 constexpr double kRouteClearance_m = 0.281;
 
-using Key = std::tuple<int, int, int>;
+using Entry = std::pair<double, std::size_t>;  // length so far and to go, lattice point
 
-Vector3d place_of(const Key& key) {
-  return Vector3d(std::get<0>(key), std::get<1>(key), std::get<2>(key)) * kLattice_m;
-}
-
-Key key_near(const Vector3d& point_m) {
-  const auto nearest = [](double x) { return static_cast<int>(std::lround(x / kLattice_m)); };
-  return {nearest(point_m.x()), nearest(point_m.y()), nearest(point_m.z())};
-}
-
+// A* over the lattice points in the map's box.
 class LatticeSearch {
  public:
   LatticeSearch(const ClearanceMap& map, double clearance_m)
-      : map_(map), clearance_m_(clearance_m) {}
+      : map_(map),
+        clearance_m_(clearance_m),
+        first_(nearest(map.geometry().box_m().min())),
+        size_(nearest(map.geometry().box_m().max()) - first_ + Vector3i::Ones()) {
+    const auto count = static_cast<std::size_t>(size_.prod());
+    length_m_.assign(count, std::numeric_limits<double>::infinity());
+    parent_.assign(count, count);
+  }
 
-  [[nodiscard]] std::vector<Vector3d> run(const Key& start, const Key& goal) {
-    const Vector3d goal_m = place_of(goal);
-    best_[start] = 0.0;
-    open_.emplace((place_of(start) - goal_m).norm(), start);
+  [[nodiscard]] Vector3d place_near(const Vector3d& point_m) const {
+    return nearest(point_m).cast<double>() * kLattice_m;
+  }
+
+  [[nodiscard]] std::vector<Vector3d> run(const Vector3d& start_m, const Vector3d& goal_m) {
+    const std::size_t start = slot_of(nearest(start_m));
+    const std::size_t goal = slot_of(nearest(goal_m));
+    length_m_[start] = 0.0;
+    open_.emplace((start_m - goal_m).norm(), start);
     while (!open_.empty()) {
-      const auto [total_m, key] = open_.top();
+      const auto [total_m, slot] = open_.top();
       open_.pop();
-      if (key == goal) {
+      if (slot == goal) {
         return route_to(goal);
       }
-      if (total_m > best_.at(key) + (place_of(key) - goal_m).norm() + 1e-9) {
-        continue;
+      if (total_m <= length_m_[slot] + (place_of(slot) - goal_m).norm() + 1e-9) {
+        expand(slot, goal_m);
       }
-      expand(key, goal_m);
     }
     return {};
   }
 
  private:
-  using Entry = std::pair<double, Key>;
+  [[nodiscard]] static Vector3i nearest(const Vector3d& point_m) {
+    return (point_m / kLattice_m).array().round().cast<int>();
+  }
+  [[nodiscard]] std::size_t slot_of(const Vector3i& lattice) const {
+    const Vector3i local = lattice - first_;
+    return static_cast<std::size_t>((local.z() * size_.y() + local.y()) * size_.x() + local.x());
+  }
+  [[nodiscard]] Vector3i lattice_of(std::size_t slot) const {
+    const int index = static_cast<int>(slot);
+    return first_ + Vector3i(index % size_.x(),
+                             index / size_.x() % size_.y(),
+                             index / (size_.x() * size_.y()));
+  }
+  [[nodiscard]] Vector3d place_of(std::size_t slot) const {
+    return lattice_of(slot).cast<double>() * kLattice_m;
+  }
 
-  void expand(const Key& key, const Vector3d& goal_m) {
+  void expand(std::size_t slot, const Vector3d& goal_m) {
+    const Vector3d from_m = place_of(slot);
     for (int i = 0; i < 27; ++i) {
-      const Key next{std::get<0>(key) + i % 3 - 1,
-                     std::get<1>(key) + i / 3 % 3 - 1,
-                     std::get<2>(key) + i / 9 - 1};
-      const Vector3d from_m = place_of(key);
-      const Vector3d to_m = place_of(next);
-      const double length_m = best_.at(key) + (to_m - from_m).norm();
-      const auto known = best_.find(next);
-      if (known != best_.end() && known->second <= length_m + 1e-9) {
-        continue;
-      }
+      const Vector3i next_lattice =
+          lattice_of(slot) + Vector3i(i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1);
+      const Vector3d to_m = next_lattice.cast<double>() * kLattice_m;
       if (!map_.clearance_at_least(to_m, clearance_m_) ||
           !map_.clearance_at_least(0.5 * (from_m + to_m), clearance_m_)) {
         continue;
       }
-      best_[next] = length_m;
-      parent_[next] = key;
-      open_.emplace(length_m + (to_m - goal_m).norm(), next);
+      const std::size_t next = slot_of(next_lattice);
+      const double length_m = length_m_[slot] + (to_m - from_m).norm();
+      if (length_m < length_m_[next] - 1e-9) {
+        length_m_[next] = length_m;
+        parent_[next] = slot;
+        open_.emplace(length_m + (to_m - goal_m).norm(), next);
+      }
     }
   }
 
-  [[nodiscard]] std::vector<Vector3d> route_to(const Key& goal) const {
-    std::vector<Vector3d> route{place_of(goal)};
-    for (auto at = parent_.find(goal); at != parent_.end(); at = parent_.find(at->second)) {
-      route.push_back(place_of(at->second));
+  [[nodiscard]] std::vector<Vector3d> route_to(std::size_t goal) const {
+    std::vector<Vector3d> route;
+    for (std::size_t at = goal; at < parent_.size(); at = parent_[at]) {
+      route.push_back(place_of(at));
     }
     std::reverse(route.begin(), route.end());
     return route;
@@ -85,8 +102,10 @@ class LatticeSearch {
 
   const ClearanceMap& map_;
   double clearance_m_;
-  std::map<Key, double> best_;
-  std::map<Key, Key> parent_;
+  Vector3i first_;
+  Vector3i size_;
+  std::vector<double> length_m_;
+  std::vector<std::size_t> parent_;
   std::priority_queue<Entry, std::vector<Entry>, std::greater<Entry>> open_;
 };
 
@@ -96,14 +115,15 @@ std::vector<Vector3d> lattice_route(const ClearanceMap& map,
                                     const Vector3d& start_m,
                                     const Vector3d& goal_m,
                                     double clearance_m) {
-  const Key start = key_near(start_m);
-  const Key goal = key_near(goal_m);
+  LatticeSearch search(map, clearance_m);
+  const Vector3d first_m = search.place_near(start_m);
+  const Vector3d last_m = search.place_near(goal_m);
   const ClearanceRule rule{clearance_m, clearance_m};
-  if (!leg_is_clear(map, start_m, place_of(start), rule, 0.0) ||
-      !leg_is_clear(map, place_of(goal), goal_m, rule, 0.0)) {
+  if (!leg_is_clear(map, start_m, first_m, rule, 0.0) ||
+      !leg_is_clear(map, last_m, goal_m, rule, 0.0)) {
     return {};
   }
-  std::vector<Vector3d> route = LatticeSearch(map, clearance_m).run(start, goal);
+  std::vector<Vector3d> route = search.run(first_m, last_m);
   if (!route.empty()) {
     route.insert(route.begin(), start_m);
     route.push_back(goal_m);

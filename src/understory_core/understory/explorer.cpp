@@ -67,7 +67,14 @@ void Explorer::review_target(const Pilot& pilot, Time now) {
   }
 }
 
-bool Explorer::is_due(const Pilot& pilot, Time now) {
+// Does what is flown end where the target is looked at from?
+bool Explorer::reaches_target(const Pilot& pilot) const {
+  return target_ && (pilot.follower().newest()->position.control_points.back() -
+                     target_->candidate.viewpoint.position_m)
+                            .norm() < pilot.clearance().geometry().resolution_m();
+}
+
+bool Explorer::is_due(const Pilot& pilot, Time now) const {
   const double waited_s = to_seconds(now - last_decision_);
   if (counters_.decisions == 0) {
     return true;
@@ -75,12 +82,15 @@ bool Explorer::is_due(const Pilot& pilot, Time now) {
   if (waited_s < config_.replan.min_interval_s) {
     return false;
   }
-  const bool stopped_short =
-      pilot.is_at_rest(now) && target_ &&
-      (pilot.follower().sample(now).position_m - target_->candidate.viewpoint.position_m).norm() >
-          pilot.clearance().geometry().resolution_m();
-  const bool still_moving = !pilot.is_at_rest(now);
-  return !target_ || stopped_short || (still_moving && waited_s >= config_.replan.max_interval_s);
+  if (!target_) {
+    return true;
+  }
+  if (!reaches_target(pilot)) {
+    // The piece of the route that is flown has to be continued before it slows down.
+    const double left_s = to_seconds(pilot.follower().newest()->end() - now);
+    return left_s < config_.replan.continue_before_end_s;
+  }
+  return !pilot.is_at_rest(now) && waited_s >= config_.replan.max_interval_s;
 }
 
 StrategyInput Explorer::gather(const Pilot& pilot, Time now, Reach reach) {
@@ -117,8 +127,8 @@ StrategyInput Explorer::gather(const Pilot& pilot, Time now, Reach reach) {
 }
 
 void Explorer::adopt(const Target& target, const Pilot& pilot, Time now) {
-  const bool is_same = target_ && target_->candidate.cluster->mean_m.isApprox(
-                                      target.candidate.cluster->mean_m, 1e-9);
+  const bool is_same =
+      target_ && is_same_place(*target_->candidate.cluster, *target.candidate.cluster);
   if (!is_same) {
     const double flight_s = target.candidate.route_length_m / config_.limits.speed_mps +
                             to_seconds(pilot.follower().newest()->duration());
@@ -128,11 +138,19 @@ void Explorer::adopt(const Target& target, const Pilot& pilot, Time now) {
   mode_ = target.mode;
 }
 
-// Null: none of the targets tried can be flown to.
-TrajectoryPtr Explorer::try_targets(Pilot& pilot, StrategyInput input, Time now) {
+bool Explorer::is_on_the_way_to(const Target& target, const Pilot& pilot) const {
+  return reaches_target(pilot) && target.mode == mode_ &&
+         is_same_place(*target_->candidate.cluster, *target.candidate.cluster);
+}
+
+// Null: what is flown goes there already, or none of the targets tried can be flown to.
+TrajectoryPtr Explorer::try_targets(Pilot& pilot, StrategyInput input, Time now, bool in_danger) {
   for (int attempt = 0; attempt < config_.replan.max_attempts; ++attempt) {
     const std::optional<Target> target = strategy_->choose(input);
     if (!target) {
+      return nullptr;
+    }
+    if (attempt == 0 && !in_danger && is_on_the_way_to(*target, pilot)) {
       return nullptr;
     }
     const Result<TrajectoryPtr, PlanError> flown =
@@ -160,7 +178,7 @@ TrajectoryPtr Explorer::try_targets(Pilot& pilot, StrategyInput input, Time now)
   return nullptr;
 }
 
-ExploreStep Explorer::decide(Pilot& pilot, Time now) {
+ExploreStep Explorer::decide(Pilot& pilot, Time now, bool in_danger) {
   ExploreStep step;
   step.decided = true;
   ++counters_.decisions;
@@ -171,7 +189,7 @@ ExploreStep Explorer::decide(Pilot& pilot, Time now) {
     if (!strategy_->choose(input)) {
       continue;
     }
-    step.published = try_targets(pilot, input, now);
+    step.published = try_targets(pilot, input, now, in_danger);
     return step;
   }
   step.status = ExploreStatus::kNothingLeft;
@@ -184,7 +202,7 @@ ExploreStep Explorer::step(Pilot& pilot, Time now) {
   const bool in_danger = !pilot.is_at_rest(now) && pilot.unsafe_from(now).has_value();
   ExploreStep step;
   if (in_danger || is_due(pilot, now)) {
-    step = decide(pilot, now);
+    step = decide(pilot, now, in_danger);
   }
   if (in_danger && !step.published) {
     const Result<TrajectoryPtr, PlanError> braked = pilot.brake(now);

@@ -57,11 +57,13 @@ class Explorer {
  private:
   enum class Reach : std::uint8_t { kNear, kAll, kAllAndSetAside };
 
-  [[nodiscard]] bool is_due(const Pilot& pilot, Time now);
+  [[nodiscard]] bool is_due(const Pilot& pilot, Time now) const;
+  [[nodiscard]] bool reaches_target(const Pilot& pilot) const;
+  [[nodiscard]] bool is_on_the_way_to(const Target& target, const Pilot& pilot) const;
   void review_target(const Pilot& pilot, Time now);
   [[nodiscard]] StrategyInput gather(const Pilot& pilot, Time now, Reach reach);
-  ExploreStep decide(Pilot& pilot, Time now);
-  [[nodiscard]] TrajectoryPtr try_targets(Pilot& pilot, StrategyInput input, Time now);
+  ExploreStep decide(Pilot& pilot, Time now, bool in_danger);
+  [[nodiscard]] TrajectoryPtr try_targets(Pilot& pilot, StrategyInput input, Time now, bool in_danger);
   void adopt(const Target& target, const Pilot& pilot, Time now);
 
   ExplorerConfig config_;

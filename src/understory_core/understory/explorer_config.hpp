@@ -51,6 +51,7 @@ struct ReplanConfig {
   double lead_s = 0.1;
   double min_interval_s = 0.4;
   double max_interval_s = 1.5;
+  double continue_before_end_s = 2.5;
   double near_route_m = 12.0;
   int max_attempts = 4;
 
@@ -63,7 +64,12 @@ struct ReplanConfig {
     f.field("max_interval_s",
             max_interval_s,
             in_range(0.1, 20.0),
-            "a trajectory is made anew after this time even when its target stands");
+            "on the way to a target, a better one is looked for this often");
+    f.field("continue_before_end_s",
+            continue_before_end_s,
+            in_range(0.2, 20.0),
+            "a trajectory that covers only a piece of its route is continued this long before it "
+            "ends");
     f.field("near_route_m",
             near_route_m,
             in_range(1.0, 1000.0),

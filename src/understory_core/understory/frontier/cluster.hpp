@@ -35,6 +35,12 @@ struct Cluster {
   [[nodiscard]] bool is_trail() const { return label == ClusterLabel::kTrail; }
 };
 
+// Clusters are made anew when they change; the border they stand for stays where it is.
+[[nodiscard]] inline bool is_same_place(const Cluster& a, const Cluster& b) {
+  constexpr double kSamePlaceM = 0.5;
+  return (a.mean_m - b.mean_m).squaredNorm() < kSamePlaceM * kSamePlaceM;
+}
+
 using ClusterPtr = std::shared_ptr<const Cluster>;
 
 }  // namespace understory

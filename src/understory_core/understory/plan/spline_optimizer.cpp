@@ -15,7 +15,8 @@ namespace {
 
 constexpr double kJerkWeight = 2e-4;
 constexpr double kPreferenceWeight = 1.0;
-constexpr std::size_t kFixed = 3;  // control points at each end
+constexpr double kFirstStep_m = 0.1;  // all control points together
+constexpr std::size_t kFixed = 3;     // control points at each end
 
 // The cost as a function of (inner control points, log of knot_s) and its gradient.
 class SplineCost {
@@ -59,12 +60,13 @@ class SplineCost {
     cost += add_clearance_cost();
     if (gradient != nullptr) {
       pack_gradient(gradient);
+      scale_to_first_step(gradient);
     }
     if (cost < lowest_cost_) {
       lowest_cost_ = cost;
       best_.assign(x, x + variables());
     }
-    return cost;
+    return scale_ * cost;
   }
 
   // Of all evaluations; when the solver stops it may stand elsewhere.
@@ -102,6 +104,15 @@ class SplineCost {
                                  point_gradient_[1].dot(bend) +
                                  point_gradient_[2].dot(v + 2.0 * bend);
     gradient[3 * inner()] = (knot_gradient_ + through_start) * knot_s_;
+  }
+
+  // The solver's first trial step is the gradient itself; it gives up when that is far too long.
+  void scale_to_first_step(double* gradient) {
+    Eigen::Map<Eigen::VectorXd> scaled{gradient, static_cast<Eigen::Index>(variables())};
+    if (scale_ == 0.0) {
+      scale_ = kFirstStep_m / std::max(1e-9, scaled.norm());
+    }
+    scaled *= scale_;
   }
 
   // (|x|^2 / limit^2 - 1)^2 where positive, times the knot spacing.
@@ -199,6 +210,7 @@ class SplineCost {
   const OptimizerEffort& effort_;
   double lowest_cost_ = std::numeric_limits<double>::infinity();
   std::vector<double> best_;
+  double scale_ = 0.0;
   double knot_s_ = 0.0;
   double knot_gradient_ = 0.0;
   std::vector<Vector3d> points_;

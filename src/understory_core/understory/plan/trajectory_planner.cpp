@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <functional>
 
 #include "understory/plan/clearance_rule.hpp"
 #include "understory/plan/control_point_chain.hpp"
@@ -21,9 +22,16 @@ constexpr Duration kSamplePeriod{10000};
 constexpr double kRelativeTolerance = 1e-6;
 constexpr double kRest = 1e-6;  // metres, m/s, m/s2, rad/s
 // The optimiser's limits are penalties: aim a little below the real ones.
-constexpr double kAimedShare = 0.985;
+constexpr double kAimedSpeed = 0.985;
+constexpr double kAimedAcceleration = 0.99;
 // Trilinear distances are off by up to a third of a voxel from the exact test's.
-constexpr double kClearanceSlackVoxels = 0.35;
+constexpr double kClearanceSlackVoxels = 0.4;
+// Coarse knots find the shape, fine ones the last tenths of a second; then, as long as the verdict
+// is against it, the penalty that was too weak grows.
+constexpr OptimizerEffort kCoarseEffort{60, true, 20.0, 3000.0};
+constexpr OptimizerEffort kFineEffort{50, true, 300.0, 5000.0};
+constexpr int kRepairEvaluations = 25;
+constexpr int kMaxRounds = 5;
 
 using PositionSpline = CubicBSpline<Vector3d>;
 
@@ -80,20 +88,43 @@ PositionSpline spline_through(const SampledMotion& motion, const Task& task) {
   return spline;
 }
 
-// In the order of preference; each is checked before the next is made.
-PositionSpline optimised(const Task& task, double preferred_clearance_m) {
+// Whether a spline may be flown, as the planner decides it.
+using Verdict = std::function<std::optional<PlanError>(const PositionSpline&)>;
+
+// The first spline the verdict admits while the penalties grow, or nothing.
+bool optimised(const Task& task, double preferred_clearance_m, const Verdict& verdict) {
   const RouteGuide guide(task.vertices_m, task.start.first, task.limits);
   const SampledMotion motion =
       motion_along(task.map, guide, {task.start.value, task.start.first}, task.limits, task.rule);
-  Limits aimed = task.limits;
-  aimed.speed_mps *= kAimedShare;
-  aimed.acceleration_mps2 *= kAimedShare;
-  const double slack_m = kClearanceSlackVoxels * task.map.geometry().resolution_m();
-  const SplineTask spline_task{
-      task.start, aimed, task.rule.hard_m + slack_m, preferred_clearance_m};
-  const PositionSpline coarse = optimized_spline(
-      task.map, spline_task, spline_through(motion, task), {60, true, 20.0, 200.0});
-  return optimized_spline(task.map, spline_task, refined_spline(coarse), {50, true, 100.0, 2000.0});
+  const double voxel_m = task.map.geometry().resolution_m();
+  SplineTask spline_task{task.start,
+                         task.limits,
+                         task.rule.hard_m + kClearanceSlackVoxels * voxel_m,
+                         preferred_clearance_m};
+  spline_task.limits.speed_mps *= kAimedSpeed;
+  spline_task.limits.acceleration_mps2 *= kAimedAcceleration;
+  PositionSpline spline = spline_through(motion, task);
+  spline = optimized_spline(task.map, spline_task, spline, kCoarseEffort);
+  spline = refined_spline(spline);
+  OptimizerEffort effort = kFineEffort;
+  std::optional<PlanError> error;
+  for (int round = 0; round < kMaxRounds; ++round) {
+    spline = optimized_spline(task.map, spline_task, spline, effort);
+    error = verdict(spline);
+    if (!error) {
+      return true;
+    }
+    if (*error == PlanError::kUnsafe) {
+      spline_task.least_clearance_m += 0.1 * voxel_m;
+      effort.clearance_weight *= 3.0;
+    } else {
+      spline_task.limits.speed_mps *= 0.998;
+      spline_task.limits.acceleration_mps2 *= 0.998;
+      effort.limit_weight *= 3.0;
+    }
+    effort.evaluations = kRepairEvaluations;
+  }
+  return false;
 }
 
 PositionSpline stop_at_corners(const Task& task) {
@@ -181,22 +212,24 @@ Result<Trajectory, PlanError> TrajectoryPlanner::plan(const ClearanceMap& map,
   trajectory.limits = limits_including(request.limits, request.start);
   trajectory.depth_stamp = map.snapshot().stamp;
   trajectory.yaw = yaw_spline(yaw_state(request.start), request.goal_yaw_rad, request.limits);
-  PlanError error = PlanError::kUnsafe;
-  const auto accepted = [&](PositionSpline position) {
-    trajectory.position = std::move(position);
+  const auto verdict = [&](const PositionSpline& position) -> std::optional<PlanError> {
+    trajectory.position = position;
     if (!within_limits(trajectory)) {
-      error = PlanError::kLimits;
-      return false;
+      return PlanError::kLimits;
     }
-    return !first_unsafe_time(map, trajectory, trajectory.start, *rule);
+    if (first_unsafe_time(map, trajectory, trajectory.start, *rule)) {
+      return PlanError::kUnsafe;
+    }
+    return std::nullopt;
   };
-  if (task.vertices_m.size() > 1 && accepted(optimised(task, config_.preferred_clearance_m))) {
+  if (task.vertices_m.size() > 1 && optimised(task, config_.preferred_clearance_m, verdict)) {
     return trajectory;
   }
-  if (accepted(stop_at_corners(task))) {
-    return trajectory;
+  const std::optional<PlanError> error = verdict(stop_at_corners(task));
+  if (error) {
+    return *error;
   }
-  return error;
+  return trajectory;
 }
 
 }  // namespace understory

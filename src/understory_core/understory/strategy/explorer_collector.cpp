@@ -30,10 +30,7 @@ std::optional<Candidate> cheapest(const std::vector<Candidate>& candidates,
 }
 
 bool is_same_target(const ClusterPtr& target, const Candidate& candidate) {
-  // Clusters are made anew when they change; the border they stand for stays where it is.
-  constexpr double kSamePlaceM = 0.5;
-  return target != nullptr &&
-         (target->mean_m - candidate.cluster->mean_m).squaredNorm() < kSamePlaceM * kSamePlaceM;
+  return target != nullptr && is_same_place(*target, *candidate.cluster);
 }
 
 }  // namespace
