@@ -77,7 +77,7 @@ def run_ctest(folder, label_pattern="", suffix="", env=None):
         label = labels.get(case.get("name"), "other") + suffix
         result = results.setdefault(label, SuiteResult(label))
         result.duration_s += float(case.get("time") or 0.0)
-        _count(case, result)
+        count_case(case, result)
     failures = sum(len(result.failed) for result in results.values())
     if status != 0 and failures == 0:
         show_log(folder / "test_run.log")
@@ -86,7 +86,8 @@ def run_ctest(folder, label_pattern="", suffix="", env=None):
     return list(results.values())
 
 
-def _count(case, result):
+def count_case(case, result):
+    """Adds one entry of the ctest report to the result of its suite."""
     name, status = case.get("name"), case.get("status")
     output = case.findtext("system-out") or ""
     skipped = case.find("skipped")

@@ -47,11 +47,11 @@ def run_logged(command, log_path, env=None, cwd=ROOT):
 
 
 def show_log(log_path, most_lines=200):
-    """Prints the end of a log, where the errors are."""
+    """Prints the end of a log, where the errors are, without the progress lines."""
     lines = log_path.read_text(encoding="utf-8", errors="replace").splitlines()
-    if len(lines) > most_lines:
-        say(f"  ... (all {len(lines)} lines: {log_path})")
+    lines = [line for line in lines if not PROGRESS.match(line)]
     say("\n".join(lines[-most_lines:]))
+    say(f"  (whole log: {log_path})")
 
 
 def output_of(command, cwd=ROOT):

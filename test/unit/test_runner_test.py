@@ -1,0 +1,107 @@
+# Copyright 2026 the Understory authors
+# SPDX-License-Identifier: BSD-3-Clause
+"""The test command's own rules: what counts as passed, failed, skipped and vanished."""
+
+import pathlib
+import sys
+import tempfile
+import unittest
+import xml.etree.ElementTree
+
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "runner"))
+
+import builds  # noqa: E402
+import results  # noqa: E402
+from results import SuiteResult  # noqa: E402
+
+
+def counted(xml_text):
+    """The SuiteResult after one ctest entry."""
+    result = SuiteResult("unit")
+    builds.count_case(xml.etree.ElementTree.fromstring(xml_text), result)
+    return result
+
+
+class CountTest(unittest.TestCase):
+    def test_a_test_that_ran_is_passed(self):
+        self.assertEqual(counted('<testcase name="A.B" status="run"/>').passed, 1)
+
+    def test_a_failing_test_is_named(self):
+        self.assertEqual(counted('<testcase name="A.B" status="fail"/>').failed, ["A.B"])
+
+    def test_a_skipped_test_carries_its_reason(self):
+        result = counted(
+            '<testcase name="A.B" status="notrun">'
+            '<skipped message="SKIP_REGULAR_EXPRESSION_MATCHED"/>'
+            "<system-out>[ RUN      ] A.B\n/x/a_test.cpp:9: Skipped\nno forests\nbeside us\n\n"
+            "[  SKIPPED ] A.B (0 ms)\n</system-out></testcase>"
+        )
+
+        self.assertEqual(result.skipped, [("A.B", "no forests beside us")])
+        self.assertEqual(result.ran, 0)
+
+    def test_a_test_that_failed_before_it_was_skipped_is_failed(self):
+        result = counted(
+            '<testcase name="A.B" status="notrun">'
+            '<skipped message="SKIP_REGULAR_EXPRESSION_MATCHED"/>'
+            "<system-out>[  SKIPPED ] A.B\n[  FAILED  ] A.B</system-out></testcase>"
+        )
+
+        self.assertEqual(result.failed, ["A.B"])
+
+    def test_a_program_that_is_not_there_is_failed(self):
+        result = counted(
+            '<testcase name="test_unit_NOT_BUILT" status="notrun">'
+            '<skipped message="Unable to find executable"/></testcase>'
+        )
+
+        self.assertEqual(result.failed, ["test_unit_NOT_BUILT"])
+
+
+class MinimumTest(unittest.TestCase):
+    def test_fewer_tests_than_expected_are_a_failure(self):
+        found = [SuiteResult("unit", passed=9)]
+
+        results.check_minimums(found, {"unit": 10}, ["unit"])
+
+        self.assertEqual(results.totals(found)[1], 1)
+
+    def test_skipped_tests_do_not_count_as_run(self):
+        found = [SuiteResult("unit", passed=9, skipped=[("A.B", "why")])]
+
+        results.check_minimums(found, {"unit": 10}, ["unit"])
+
+        self.assertEqual(results.totals(found), (9, 1, 1))
+
+    def test_a_suite_that_did_not_report_is_a_failure(self):
+        found = [SuiteResult("unit", passed=10)]
+
+        results.check_minimums(found, {"unit": 10, "scenario": 3}, ["scenario", "unit"])
+
+        self.assertEqual(results.totals(found), (10, 1, 0))
+
+    def test_a_broken_list_of_minimums_names_file_and_line(self):
+        with tempfile.TemporaryDirectory() as folder:
+            path = pathlib.Path(folder) / "counts.txt"
+            path.write_text("unit 3\nscenario many\n", encoding="utf-8")
+
+            with self.assertRaisesRegex(ValueError, "counts.txt:2"):
+                results.read_minimums(path)
+
+
+class SummaryTest(unittest.TestCase):
+    def test_last_line_counts_alone_and_skips_and_failures_are_named(self):
+        text = results.summary(
+            [
+                SuiteResult("unit", passed=3, skipped=[("A.B", "no forests")]),
+                SuiteResult("shell", failed=["see above"]),
+            ]
+        )
+
+        self.assertEqual(text.splitlines()[-1], "3 passed, 1 failed, 1 skipped")
+        self.assertIn("skipped: unit: A.B: no forests", text)
+        self.assertIn("FAILED: shell: see above", text)
+
+
+if __name__ == "__main__":
+    unittest.main()
