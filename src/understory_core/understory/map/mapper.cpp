@@ -3,7 +3,6 @@
 #include "understory/map/mapper.hpp"
 
 #include <algorithm>
-#include <bitset>
 #include <cassert>
 #include <cmath>
 
@@ -27,10 +26,6 @@ MapSnapshot unknown_map(const MapConfig& config, const Box3d& box_m) {
       GridGeometry(config.resolution_m, box_m), SensorModel(config.sensor), 0, Time{}, {}, {}};
   map.tiles.resize(map.geometry.slot_count());
   return map;
-}
-
-std::size_t count_bits(unsigned bits) {
-  return std::bitset<16>(bits).count();
 }
 
 // Where the point lies, or would if it were not infinitely far; zero if that cannot be told.
@@ -193,11 +188,11 @@ IntegrateCounts Mapper::apply_marks(TileSlot slot, const TileMarks& marks) {
   IntegrateCounts counts;
   for (std::size_t row = 0; row < kRowsPerTile; ++row) {
     const unsigned hits = marks.hits[row];
-    counts.hit_voxels += count_bits(hits);
     for (unsigned left = hits | marks.misses[row]; left != 0; left &= left - 1) {
       const auto x = static_cast<unsigned>(__builtin_ctz(left));
       const unsigned bit = 1U << x;
       const bool is_hit = (hits & bit) != 0;
+      counts.hit_voxels += is_hit ? 1U : 0U;
       const std::size_t offset = row * kTileVoxels + x;
       const Tile* tile = current_.tiles[slot].get();
       const int before = tile == nullptr ? kUnknown : tile->log_odds_at(offset);

@@ -23,13 +23,17 @@ struct PixelVoxels {
   std::array<int, kCapacity> z;
 };
 
+float range_squared_m2(const CameraView& view) {
+  const double range_m = static_cast<double>(view.range_vox()) * view.resolution_m();
+  return static_cast<float>(range_m * range_m);
+}
+
 class ReturnLocator {
  public:
   ReturnLocator(const CameraView& view, const ScanWindow& window)
       : inverse_fx_(static_cast<float>(1.0 / view.camera().fx)),
         cx_(static_cast<float>(view.camera().cx)),
-        range_squared_m2_(
-            static_cast<float>(view.camera().max_range_m * view.camera().max_range_m)),
+        range_squared_m2_(range_squared_m2(view)),
         view_(view),
         // One more, so that what lies just below the window truncates to 0.
         start_((view.origin_vox() - window.voxels().min.cast<double>()).cast<float>().array() + 1),

@@ -83,9 +83,7 @@ class FrustumMarker {
         // Up to the last block whose four pixels exist.
         u_limit_(static_cast<float>(view.camera().width_px) - 1.001F),
         v_limit_(static_cast<float>(view.camera().height_px) - 1.001F) {
-    // Half a voxel short of the range: beyond, the camera has not seen the voxel's far side.
-    const float range = larger(view.range_vox() - 0.5F, 0.0F);
-    range_squared_ = range * range;
+    range_squared_ = view.range_vox() * view.range_vox();
   }
 
   [[nodiscard]] bool may_see(const VoxelBox& voxels) const {

@@ -136,14 +136,35 @@ std::optional<Candidate> ExplorerCollector::choose_as_collector(const StrategyIn
       });
 }
 
+// The cheapest view of a cluster decides which cluster is next. It is flown to beyond that view, to
+// one nearer the cluster: the cluster is seen on the way there, and the vehicle need not slow down.
+Candidate ExplorerCollector::far_view_of(const StrategyInput& input,
+                                         const Candidate& cheapest) const {
+  const Vector3d direction = cheapest.viewpoint.position_m - input.vehicle.position_m;
+  const Candidate* far = &cheapest;
+  for (const Candidate& candidate : input.candidates) {
+    const Vector3d onward = candidate.viewpoint.position_m - input.vehicle.position_m;
+    const double detour_m = candidate.route_length_m - cheapest.route_length_m;
+    if (candidate.cluster == cheapest.cluster && candidate.route_length_m > far->route_length_m &&
+        detour_m <= config_.overshoot_m &&
+        candidate.viewpoint.coverage >= 0.8 * cheapest.viewpoint.coverage &&
+        std::abs(angle_difference(candidate.viewpoint.yaw_rad, cheapest.viewpoint.yaw_rad)) < 0.4 &&
+        (direction.norm() < 0.5 || onward.normalized().dot(direction.normalized()) > 0.8)) {
+      far = &candidate;
+    }
+  }
+  return *far;
+}
+
 std::optional<Target> ExplorerCollector::choose(const StrategyInput& input) const {
   const FlightMode mode = select_mode(input);
-  const std::optional<Candidate> candidate =
-      mode == FlightMode::kCollector ? choose_as_collector(input) : choose_as_explorer(input);
+  const std::optional<Candidate> candidate = mode == FlightMode::kCollector
+                                                 ? choose_as_collector(input)
+                                                 : choose_as_explorer(input);
   if (!candidate) {
     return std::nullopt;
   }
-  return Target{*candidate, mode};
+  return Target{far_view_of(input, *candidate), mode};
 }
 
 }  // namespace understory

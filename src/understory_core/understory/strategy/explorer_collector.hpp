@@ -84,11 +84,16 @@ struct ExplorerCollectorConfig {
   ExplorerCostConfig explorer;
   CollectorCostConfig collector;
   double keep_target_bonus = 0.3;
+  double overshoot_m = 2.0;
 
   void visit(FieldVisitor& f) {
     f.section("mode", mode, "When to be a Collector (paper, III-A).");
     f.section("explorer", explorer, "Cost of an Explorer's targets (paper, eq. 1 to 4).");
     f.section("collector", collector, "Cost of a Collector's targets (paper, eq. 5 to 7).");
+    f.field("overshoot_m",
+            overshoot_m,
+            in_range(0.0, 20.0),
+            "a cluster is flown to by a view at most so much further than its cheapest one");
     f.field("keep_target_bonus",
             keep_target_bonus,
             in_range(0.0, 100.0),
@@ -117,6 +122,7 @@ class ExplorerCollector final : public Strategy {
  private:
   [[nodiscard]] double near_radius_m(FlightMode mode) const;
   [[nodiscard]] double turn_angle(const StrategyInput& input, const Vector3d& position_m) const;
+  [[nodiscard]] Candidate far_view_of(const StrategyInput& input, const Candidate& cheapest) const;
   [[nodiscard]] std::optional<Candidate> choose_as_explorer(const StrategyInput& input) const;
   [[nodiscard]] std::optional<Candidate> choose_as_collector(const StrategyInput& input) const;
 

@@ -17,10 +17,6 @@ Box2d disc_box(const Trunk& trunk) {
   return {trunk.center_m - reach, trunk.center_m + reach};
 }
 
-double squared_distance(const Vector2d& point, const Box2d& box) {
-  return box.squaredExteriorDistance(point);
-}
-
 }  // namespace
 
 TrunkIndex::TrunkIndex(const std::vector<Trunk>& trunks) {
@@ -73,29 +69,19 @@ int TrunkIndex::cell_along(double offset_m, int count) const {
   return static_cast<int>(std::clamp(offset_m / cell_m_, 0.0, static_cast<double>(count - 1)));
 }
 
-double TrunkIndex::nearest_in_cell(int cx, int cy, const Vector2d& p, double best_m) const {
-  const std::size_t cell = static_cast<std::size_t>(cy) * static_cast<std::size_t>(count_x_) +
-                           static_cast<std::size_t>(cx);
-  for (std::uint32_t i = first_[cell]; i < first_[cell + 1]; ++i) {
-    const Disc& disc = discs_[i];
-    const double dx = p.x() - disc.x_m;
-    const double dy = p.y() - disc.y_m;
-    best_m = std::min(best_m, std::sqrt(dx * dx + dy * dy) - disc.radius_m);
-  }
-  return best_m;
-}
-
-// The cells at Chebyshev distance `ring` from the point's own, as far as they exist.
-double TrunkIndex::nearest_in_ring(int ring, const Vector2d& p, double best_m) const {
-  const int px = cell_along(p.x() - origin_m_.x(), count_x_);
-  const int py = cell_along(p.y() - origin_m_.y(), count_y_);
-  for (int cy = std::max(0, py - ring); cy <= std::min(count_y_ - 1, py + ring); ++cy) {
-    const bool whole_row = cy == py - ring || cy == py + ring;
-    const int step = whole_row || ring == 0 ? 1 : 2 * ring;
-    for (int cx = px - ring; cx <= px + ring; cx += step) {
-      if (cx >= 0 && cx < count_x_) {
-        best_m = nearest_in_cell(cx, cy, p, best_m);
-      }
+double TrunkIndex::nearest_within(const Vector2d& p, double reach_m, double best_m) const {
+  const Vector2d offset = p - origin_m_;
+  const auto x_first = static_cast<std::size_t>(cell_along(offset.x() - reach_m, count_x_));
+  const auto x_last = static_cast<std::size_t>(cell_along(offset.x() + reach_m, count_x_));
+  const auto y_first = static_cast<std::size_t>(cell_along(offset.y() - reach_m, count_y_));
+  const auto y_last = static_cast<std::size_t>(cell_along(offset.y() + reach_m, count_y_));
+  for (std::size_t cy = y_first; cy <= y_last; ++cy) {
+    const std::size_t row = cy * static_cast<std::size_t>(count_x_);
+    for (std::uint32_t i = first_[row + x_first]; i < first_[row + x_last + 1]; ++i) {
+      const Disc& disc = discs_[i];
+      const double dx = p.x() - disc.x_m;
+      const double dy = p.y() - disc.y_m;
+      best_m = std::min(best_m, std::sqrt(dx * dx + dy * dy) - disc.radius_m);
     }
   }
   return best_m;
@@ -105,22 +91,11 @@ double TrunkIndex::distance_m(const Vector2d& point_m, double max_m) const {
   if (discs_.empty()) {
     return max_m;
   }
-  // Measured from the point's projection into the grid, ring k is at least `margin + (k - 1) cells`
-  // away; the true distance is never less.
-  const Vector2d offset = point_m - origin_m_;
-  const Box2d grid(Vector2d::Zero(), Vector2d(count_x_, count_y_) * cell_m_);
-  const double outside_m = std::sqrt(squared_distance(offset, grid));
-  if (outside_m >= max_m) {
-    return max_m;
-  }
-  const double in_cell_x = offset.x() - cell_along(offset.x(), count_x_) * cell_m_;
-  const double in_cell_y = offset.y() - cell_along(offset.y(), count_y_) * cell_m_;
-  const double margin_m =
-      std::max(0.0, std::min({in_cell_x, in_cell_y, cell_m_ - in_cell_x, cell_m_ - in_cell_y}));
-  double best_m = nearest_in_ring(0, point_m, max_m);
-  const int rings = std::max(count_x_, count_y_);
-  for (int ring = 1; ring < rings && best_m > margin_m + (ring - 1) * cell_m_; ++ring) {
-    best_m = nearest_in_ring(ring, point_m, best_m);
+  double reach_m = std::min(cell_m_, max_m);
+  double best_m = nearest_within(point_m, reach_m, max_m);
+  while (best_m > reach_m) {  // what was found may hide something nearer outside the square
+    reach_m = std::min(2.0 * reach_m, best_m);
+    best_m = nearest_within(point_m, reach_m, best_m);
   }
   return best_m;
 }
@@ -138,7 +113,8 @@ std::vector<std::size_t> TrunkIndex::touching(const Box2d& rectangle_m) const {
                                static_cast<std::size_t>(cx);
       for (std::uint32_t i = first_[cell]; i < first_[cell + 1]; ++i) {
         const Disc& disc = discs_[i];
-        if (squared_distance({disc.x_m, disc.y_m}, rectangle_m) <= disc.radius_m * disc.radius_m) {
+        if (rectangle_m.squaredExteriorDistance(Vector2d(disc.x_m, disc.y_m)) <=
+            disc.radius_m * disc.radius_m) {
           found.push_back(disc.trunk);
         }
       }

@@ -34,8 +34,8 @@ class TrunkIndex {
   };
 
   [[nodiscard]] int cell_along(double offset_m, int count) const;  // clamped into the grid
-  [[nodiscard]] double nearest_in_cell(int cx, int cy, const Vector2d& p, double best_m) const;
-  [[nodiscard]] double nearest_in_ring(int ring, const Vector2d& p, double best_m) const;
+  // Looks at every cell that the square of this half size around the point meets.
+  [[nodiscard]] double nearest_within(const Vector2d& p, double reach_m, double best_m) const;
 
   Vector2d origin_m_ = Vector2d::Zero();
   double cell_m_ = 1.0;
