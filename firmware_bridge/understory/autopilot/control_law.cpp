@@ -234,8 +234,10 @@ MotorCommands ControlLaw::mix(double thrust_n, const Vector3d& torque_nm) const 
     high_n = std::max(high_n, tilt_n[i]);
   }
   const double tilt_share = std::min(1.0, max_n / std::max(high_n - low_n, 1e-9));
-  const double mean_n =
-      std::clamp(0.25 * thrust_n, -low_n * tilt_share, max_n - high_n * tilt_share);
+  const double least_n = -low_n * tilt_share;
+  // With all authority taken by the tilt both bounds are one, up to rounding.
+  const double most_n = std::max(least_n, max_n - high_n * tilt_share);
+  const double mean_n = std::clamp(0.25 * thrust_n, least_n, most_n);
 
   const double yaw_n = torque_nm.z() / (4.0 * airframe_.torque_per_thrust_m);
   double yaw_share = 1.0;

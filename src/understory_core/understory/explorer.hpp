@@ -63,7 +63,10 @@ class Explorer {
   void review_target(const Pilot& pilot, Time now);
   [[nodiscard]] StrategyInput gather(const Pilot& pilot, Time now, Reach reach);
   ExploreStep decide(Pilot& pilot, Time now, bool in_danger);
-  [[nodiscard]] TrajectoryPtr try_targets(Pilot& pilot, StrategyInput input, Time now, bool in_danger);
+  [[nodiscard]] TrajectoryPtr try_targets(Pilot& pilot,
+                                          StrategyInput input,
+                                          Time now,
+                                          bool in_danger);
   void adopt(const Target& target, const Pilot& pilot, Time now);
 
   ExplorerConfig config_;
