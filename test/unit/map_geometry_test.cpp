@@ -13,27 +13,29 @@ namespace understory {
 namespace {
 
 // Neither at zero nor a multiple of tiles in size.
-const Box3d kOddBox(Vector3d(-3.7, -0.4, -0.2), Vector3d(1.9, 2.5, 2.0));
+Box3d odd_box() {
+  return {Vector3d(-3.7, -0.4, -0.2), Vector3d(1.9, 2.5, 2.0)};
+}
 
 TEST(GridGeometry, BoxAtNegativeCoordinatesKeepsItsFaces) {
-  const GridGeometry geometry(0.1, kOddBox);
+  const GridGeometry geometry(0.1, odd_box());
 
   EXPECT_EQ(geometry.voxels().min, VoxelIndex(-37, -4, -2));
   EXPECT_EQ(geometry.voxels().end, VoxelIndex(19, 25, 20));
-  EXPECT_TRUE(geometry.box_m().isApprox(kOddBox, 1e-9));
+  EXPECT_TRUE(geometry.box_m().isApprox(odd_box(), 1e-9));
   EXPECT_EQ(geometry.tile_min(), Vector3i(-3, -1, -1));
   EXPECT_EQ(geometry.tile_count(), Vector3i(5, 3, 3));
 }
 
 TEST(GridGeometry, PointBelowZeroLiesInTheVoxelBelow) {
-  const GridGeometry geometry(0.1, kOddBox);
+  const GridGeometry geometry(0.1, odd_box());
 
   EXPECT_EQ(geometry.index_of({-0.01, 0.01, -0.11}), VoxelIndex(-1, 0, -2));
   EXPECT_TRUE(geometry.center_of({-1, 0, -2}).isApprox(Vector3d(-0.05, 0.05, -0.15), 1e-12));
 }
 
 TEST(GridGeometry, SlotsAndTilesAreInversesAndCoverTheBoxOnce) {
-  const GridGeometry geometry(0.1, kOddBox);
+  const GridGeometry geometry(0.1, odd_box());
 
   std::set<TileSlot> seen;
   int voxels = 0;
@@ -50,7 +52,7 @@ TEST(GridGeometry, SlotsAndTilesAreInversesAndCoverTheBoxOnce) {
 }
 
 TEST(GridGeometry, RegionTouchesExactlyItsVoxelsInsideTheBox) {
-  const GridGeometry geometry(0.1, kOddBox);
+  const GridGeometry geometry(0.1, odd_box());
 
   const VoxelBox touched =
       geometry.voxels_touched_by({Vector3d(-0.11, -9.0, 1.55), Vector3d(0.22, 0.05, 9.0)});
@@ -60,7 +62,7 @@ TEST(GridGeometry, RegionTouchesExactlyItsVoxelsInsideTheBox) {
 }
 
 TEST(GridGeometry, RegionOfAbsurdExtentTouchesTheBoxOrNothing) {
-  const GridGeometry geometry(0.1, kOddBox);
+  const GridGeometry geometry(0.1, odd_box());
   const double infinity = std::numeric_limits<double>::infinity();
   const double nan = std::numeric_limits<double>::quiet_NaN();
 
@@ -80,8 +82,8 @@ TEST(GridGeometry, RegionOfAbsurdExtentTouchesTheBoxOrNothing) {
 TEST(GridGeometry, AbsurdBoxIsAConfigurationError) {
   const double nan = std::numeric_limits<double>::quiet_NaN();
 
-  EXPECT_THROW(GridGeometry(0.0, kOddBox), ConfigError);
-  EXPECT_THROW(GridGeometry(nan, kOddBox), ConfigError);
+  EXPECT_THROW(GridGeometry(0.0, odd_box()), ConfigError);
+  EXPECT_THROW(GridGeometry(nan, odd_box()), ConfigError);
   EXPECT_THROW(GridGeometry(0.1, Box3d()), ConfigError);
   EXPECT_THROW(GridGeometry(0.1, Box3d(Vector3d::Zero(), Vector3d(1.0, nan, 1.0))), ConfigError);
   EXPECT_THROW(GridGeometry(0.1, Box3d(Vector3d::Zero(), Vector3d(1e9, 1.0, 1.0))), ConfigError);

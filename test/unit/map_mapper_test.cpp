@@ -13,10 +13,15 @@
 namespace understory {
 namespace {
 
+constexpr std::size_t kPixels = 160U * 120U;
 constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
-const Box3d kRoom(Vector3d(-2.0, -3.0, 0.0), Vector3d(6.0, 3.0, 2.0));
-const Vector3d kEye(0.05, 0.05, 1.05);
+Box3d room() {
+  return {Vector3d(-2.0, -3.0, 0.0), Vector3d(6.0, 3.0, 2.0)};
+}
+Vector3d eye() {
+  return {0.05, 0.05, 1.05};
+}
 
 CameraModel camera() {
   return CameraModel(test::camera_config(160, 120));
@@ -28,8 +33,13 @@ Pose looking_along_x(const Vector3d& eye_m) {
 
 DepthImage wall_at(float depth_m) {
   DepthImage image{camera().width_px, camera().height_px, {}};
-  image.z_m.assign(static_cast<std::size_t>(image.width_px * image.height_px), depth_m);
+  image.z_m.assign(kPixels, depth_m);
   return image;
+}
+
+float& pixel(DepthImage& image, int u, int v) {
+  return image.z_m[static_cast<std::size_t>(v) * static_cast<std::size_t>(image.width_px) +
+                   static_cast<std::size_t>(u)];
 }
 
 struct Outcome {
@@ -41,16 +51,16 @@ struct Outcome {
   }
 };
 
-Outcome after_one_image(const DepthImage& image, const Vector3d& eye_m = kEye) {
-  Mapper mapper(MapConfig{}, kRoom);
+Outcome after_one_image(const DepthImage& image, const Vector3d& eye_m = eye()) {
+  Mapper mapper(MapConfig{}, room());
   const auto counts = mapper.integrate(camera(), image.view(), looking_along_x(eye_m), Time{});
   return {counts.value(), mapper.publish()};
 }
 
 Outcome after_one_cloud(const std::vector<float>& points,
                         double max_range_m = 4.5,
-                        const Vector3d& eye_m = kEye) {
-  Mapper mapper(MapConfig{}, kRoom);
+                        const Vector3d& eye_m = eye()) {
+  Mapper mapper(MapConfig{}, room());
   const auto counts = mapper.integrate_rays(
       {points.data(), 3, points.size() / 3}, level_pose(eye_m, 0.0), max_range_m, Time{});
   return {counts.value(), mapper.publish()};
@@ -60,7 +70,8 @@ TEST(Mapper, WallAheadIsHitAndSpaceBeforeItCleared) {
   const Outcome after = after_one_image(wall_at(2.03F));
 
   EXPECT_GT(after.counts.hit_voxels, 100U);
-  for (double x = 0.05; x < 1.95; x += 0.1) {
+  for (int i = 0; i < 20; ++i) {
+    const double x = 0.05 + 0.1 * i;
     EXPECT_EQ(after.state_at(x, 0.05, 1.05), VoxelState::kFree) << x;
   }
   EXPECT_EQ(after.state_at(2.08, 0.05, 1.05), VoxelState::kUncertain);
@@ -68,11 +79,11 @@ TEST(Mapper, WallAheadIsHitAndSpaceBeforeItCleared) {
 }
 
 TEST(Mapper, RepeatedReturnsMakeAVoxelOccupiedUpToTheClamp) {
-  Mapper mapper(MapConfig{}, kRoom);
+  Mapper mapper(MapConfig{}, room());
   const DepthImage wall = wall_at(2.03F);
 
   for (int frame = 0; frame < 20; ++frame) {
-    (void)mapper.integrate(camera(), wall.view(), looking_along_x(kEye), Time{});
+    (void)mapper.integrate(camera(), wall.view(), looking_along_x(eye()), Time{});
   }
   const MapSnapshotPtr map = mapper.publish();
 
@@ -97,7 +108,7 @@ TEST(Mapper, ReturnWinsOverRaysThatPassTheSameVoxel) {
   DepthImage image = wall_at(3.0F);
   for (int v = 0; v < image.height_px; ++v) {
     for (int u = 0; u <= image.width_px / 2; u += 2) {
-      image.z_m[static_cast<std::size_t>(v * image.width_px + u)] = 1.0F;
+      pixel(image, u, v) = 1.0F;
     }
   }
 
@@ -129,7 +140,7 @@ TEST(Mapper, PixelsWithoutMeasurementSayNothing) {
   for (const float nothing : {kNan, 0.0F, -1.0F, -kInfinity}) {
     const Outcome after = after_one_image(wall_at(nothing));
 
-    EXPECT_EQ(after.counts.skipped_points, 160U * 120U) << nothing;
+    EXPECT_EQ(after.counts.skipped_points, kPixels) << nothing;
     EXPECT_TRUE(after.map->changed_tiles.empty()) << nothing;
   }
 }
@@ -138,7 +149,7 @@ TEST(Mapper, HoleOfNanPixelsLeavesWhatLiesBehindItUnknown) {
   DepthImage image = wall_at(3.0F);
   for (int v = 50; v < 70; ++v) {
     for (int u = 70; u < 90; ++u) {
-      image.z_m[static_cast<std::size_t>(v * image.width_px + u)] = kNan;
+      pixel(image, u, v) = kNan;
     }
   }
 
@@ -176,11 +187,11 @@ TEST(Mapper, StridedCloudGivesTheSameMapAsAPlainImage) {
   for (std::size_t i = 0; i < wall.z_m.size(); ++i) {
     cloud[4 * i + 2] = wall.z_m[i];
   }
-  Mapper mapper(MapConfig{}, kRoom);
+  Mapper mapper(MapConfig{}, room());
 
   (void)mapper.integrate(camera(),
                          DepthView{cloud.data() + 2, 4, wall.width_px, wall.height_px},
-                         looking_along_x(kEye),
+                         looking_along_x(eye()),
                          Time{});
 
   EXPECT_TRUE(test::same_content(*mapper.publish(), *after_one_image(wall).map));
@@ -188,24 +199,24 @@ TEST(Mapper, StridedCloudGivesTheSameMapAsAPlainImage) {
 
 TEST(Mapper, ImageTooCoarseForItsVoxelsIsIntegratedRayByRay) {
   const CameraModel coarse(test::camera_config(16, 12));
-  DepthImage image{16, 12, std::vector<float>(16 * 12, 3.03F)};
-  Mapper by_image(MapConfig{}, kRoom);
-  Mapper by_rays(MapConfig{}, kRoom);
+  DepthImage image{16, 12, std::vector<float>(192, 3.03F)};
+  Mapper by_image(MapConfig{}, room());
+  Mapper by_rays(MapConfig{}, room());
   const std::vector<float> points = test::to_points(image, coarse, 2.0);
 
-  (void)by_image.integrate(coarse, image.view(), looking_along_x(kEye), Time{});
+  (void)by_image.integrate(coarse, image.view(), looking_along_x(eye()), Time{});
   (void)by_rays.integrate_rays(
-      {points.data(), 3, points.size() / 3}, looking_along_x(kEye), 4.5, Time{});
+      {points.data(), 3, points.size() / 3}, looking_along_x(eye()), 4.5, Time{});
 
   EXPECT_TRUE(test::same_content(*by_image.publish(), *by_rays.publish()));
 }
 
 TEST(Mapper, BadPoseOrImageIsAnErrorAndChangesNothing) {
-  Mapper mapper(MapConfig{}, kRoom);
+  Mapper mapper(MapConfig{}, room());
   const DepthImage wall = wall_at(2.0F);
-  Pose nan_pose = looking_along_x(kEye);
+  Pose nan_pose = looking_along_x(eye());
   nan_pose.translation().y() = std::nan("");
-  Pose no_rotation = looking_along_x(kEye);
+  Pose no_rotation = looking_along_x(eye());
   no_rotation.linear().setZero();
   const CameraModel other_camera(test::camera_config(640, 480));
   const std::vector<float> point{1.0F, 0.0F, 0.0F};
@@ -213,9 +224,9 @@ TEST(Mapper, BadPoseOrImageIsAnErrorAndChangesNothing) {
   const auto nan_result = mapper.integrate(camera(), wall.view(), nan_pose, Time{});
   const auto zero_result = mapper.integrate(camera(), wall.view(), no_rotation, Time{});
   const auto size_result =
-      mapper.integrate(other_camera, wall.view(), looking_along_x(kEye), Time{});
+      mapper.integrate(other_camera, wall.view(), looking_along_x(eye()), Time{});
   const auto null_result =
-      mapper.integrate(camera(), {nullptr, 1, 160, 120}, looking_along_x(kEye), Time{});
+      mapper.integrate(camera(), {nullptr, 1, 160, 120}, looking_along_x(eye()), Time{});
   const auto rays_result = mapper.integrate_rays({point.data(), 3, 1}, nan_pose, 4.5, Time{});
 
   EXPECT_EQ(nan_result.error(), IntegrateError::kBadPose);

@@ -12,7 +12,9 @@
 namespace understory {
 namespace {
 
-const Box3d kRoom(Vector3d(-2.0, -3.0, 0.0), Vector3d(6.0, 3.0, 2.0));
+Box3d room() {
+  return {Vector3d(-2.0, -3.0, 0.0), Vector3d(6.0, 3.0, 2.0)};
+}
 
 void shoot(Mapper& mapper, const Eigen::Vector3f& point, Time stamp = Time{}) {
   (void)mapper.integrate_rays(
@@ -20,7 +22,7 @@ void shoot(Mapper& mapper, const Eigen::Vector3f& point, Time stamp = Time{}) {
 }
 
 TEST(MapSnapshot, OldSnapshotNeverChangesWhileTheMapperGoesOn) {
-  Mapper mapper(MapConfig{}, kRoom);
+  Mapper mapper(MapConfig{}, room());
   shoot(mapper, {2.0F, 0.0F, 0.0F});
   const MapSnapshotPtr old = mapper.publish();
   std::vector<Tile> tiles_before;
@@ -30,7 +32,7 @@ TEST(MapSnapshot, OldSnapshotNeverChangesWhileTheMapperGoesOn) {
 
   for (int i = 0; i < 10; ++i) {
     shoot(mapper, {2.0F, 0.1F * static_cast<float>(i), 0.3F});
-    mapper.mark_free(kRoom, Time{});
+    mapper.mark_free(room(), Time{});
     (void)mapper.publish();
   }
 
@@ -43,7 +45,7 @@ TEST(MapSnapshot, OldSnapshotNeverChangesWhileTheMapperGoesOn) {
 }
 
 TEST(MapSnapshot, ChangedTilesAreExactlyThoseTheRayTouched) {
-  Mapper mapper(MapConfig{}, kRoom);
+  Mapper mapper(MapConfig{}, room());
 
   shoot(mapper, {2.0F, 0.0F, 0.0F});
   const MapSnapshotPtr map = mapper.publish();
@@ -55,7 +57,7 @@ TEST(MapSnapshot, ChangedTilesAreExactlyThoseTheRayTouched) {
 }
 
 TEST(MapSnapshot, TilesWhoseVoxelsAreAllAtTheClampAreNotTouchedAgain) {
-  Mapper mapper(MapConfig{}, kRoom);
+  Mapper mapper(MapConfig{}, room());
   for (int i = 0; i < 10; ++i) {
     shoot(mapper, {2.0F, 0.0F, 0.0F});
   }
@@ -69,7 +71,7 @@ TEST(MapSnapshot, TilesWhoseVoxelsAreAllAtTheClampAreNotTouchedAgain) {
 }
 
 TEST(MapSnapshot, UntouchedTilesAreSharedBetweenSnapshots) {
-  Mapper mapper(MapConfig{}, kRoom);
+  Mapper mapper(MapConfig{}, room());
   shoot(mapper, {2.0F, 0.0F, 0.0F});
   const MapSnapshotPtr first = mapper.publish();
 
@@ -83,7 +85,7 @@ TEST(MapSnapshot, UntouchedTilesAreSharedBetweenSnapshots) {
 }
 
 TEST(MapSnapshot, RevisionGrowsByOneAndStampIsThatOfTheNewestCloud) {
-  Mapper mapper(MapConfig{}, kRoom);
+  Mapper mapper(MapConfig{}, room());
   const Time newest{std::chrono::seconds(7)};
 
   shoot(mapper, {2.0F, 0.0F, 0.0F}, newest);
@@ -98,7 +100,7 @@ TEST(MapSnapshot, RevisionGrowsByOneAndStampIsThatOfTheNewestCloud) {
 }
 
 TEST(MapSnapshot, OutsideTheBoxNothingIsFreeOrKnown) {
-  Mapper mapper(MapConfig{}, kRoom);
+  Mapper mapper(MapConfig{}, room());
   mapper.mark_free({Vector3d::Constant(-100.0), Vector3d::Constant(100.0)}, Time{});
 
   const MapSnapshotPtr map = mapper.publish();
@@ -111,7 +113,7 @@ TEST(MapSnapshot, OutsideTheBoxNothingIsFreeOrKnown) {
 }
 
 TEST(MarkFree, ClearsVoxelsWhoseCentresLieInTheRegionButNoReturns) {
-  Mapper mapper(MapConfig{}, kRoom);
+  Mapper mapper(MapConfig{}, room());
   shoot(mapper, {0.5F, 0.0F, 0.0F});
 
   mapper.mark_free({Vector3d(0.26, 0.0, 1.0), Vector3d(0.84, 0.1, 1.1)}, Time{});
@@ -128,7 +130,7 @@ TEST(MarkFree, ClearsVoxelsWhoseCentresLieInTheRegionButNoReturns) {
 }
 
 TEST(MarkFree, UndefinedRegionChangesNothing) {
-  Mapper mapper(MapConfig{}, kRoom);
+  Mapper mapper(MapConfig{}, room());
   const double nan = std::numeric_limits<double>::quiet_NaN();
 
   mapper.mark_free(Box3d(), Time{});
@@ -139,7 +141,7 @@ TEST(MarkFree, UndefinedRegionChangesNothing) {
 }
 
 TEST(ResumedMapper, FirstPublicationBringsAllThereIsAndLaterOnesTheChanges) {
-  Mapper before(MapConfig{}, kRoom);
+  Mapper before(MapConfig{}, room());
   shoot(before, {2.0F, 0.0F, 0.0F});
   const MapSnapshotPtr saved = before.publish();
 
@@ -155,7 +157,7 @@ TEST(ResumedMapper, FirstPublicationBringsAllThereIsAndLaterOnesTheChanges) {
 }
 
 TEST(ResumedMapper, TilesThatDoNotFitTheBoxAreAConfigurationError) {
-  MapSnapshot broken = test::random_map(kRoom, 0.1, 1);
+  MapSnapshot broken = test::random_map(room(), 0.1, 1);
   broken.tiles.pop_back();
 
   EXPECT_THROW(Mapper{broken}, ConfigError);

@@ -13,7 +13,8 @@ namespace {
 
 // A quaternion of zeros, or one never normalised, yields a finite matrix that is no rotation.
 constexpr double kRotationTolerance = 1e-3;
-constexpr int kUnknown = static_cast<int>(kUnknownLogOdds);
+constexpr int kUnknown = -128;
+static_assert(kUnknown == kUnknownLogOdds);
 
 bool is_valid(const Pose& pose) {
   const Eigen::Matrix3d product = pose.linear() * pose.linear().transpose();
@@ -184,27 +185,31 @@ IntegrateCounts Mapper::apply_window() {
 }
 
 IntegrateCounts Mapper::apply_marks(TileSlot slot, const TileMarks& marks) {
-  const SensorModel& model = current_.sensor_model;
   IntegrateCounts counts;
   for (std::size_t row = 0; row < kRowsPerTile; ++row) {
     const unsigned hits = marks.hits[row];
     for (unsigned left = hits | marks.misses[row]; left != 0; left &= left - 1) {
       const auto x = static_cast<unsigned>(__builtin_ctz(left));
-      const unsigned bit = 1U << x;
-      const bool is_hit = (hits & bit) != 0;
+      const bool is_hit = ((hits >> x) & 1U) != 0;
+      const bool changed = update_voxel(slot, row * kTileVoxels + x, is_hit);
       counts.hit_voxels += is_hit ? 1U : 0U;
-      const std::size_t offset = row * kTileVoxels + x;
-      const Tile* tile = current_.tiles[slot].get();
-      const int before = tile == nullptr ? kUnknown : tile->log_odds_at(offset);
-      const int start = before == kUnknown ? 0 : before;
-      const int after = std::clamp(start + (is_hit ? model.hit : model.miss), model.min, model.max);
-      if (after != before) {
-        counts.missed_voxels += is_hit ? 0U : 1U;
-        writable_tile(slot).set(offset, static_cast<std::int8_t>(after));
-      }
+      counts.missed_voxels += changed && !is_hit ? 1U : 0U;
     }
   }
   return counts;
+}
+
+bool Mapper::update_voxel(TileSlot slot, std::size_t offset, bool is_hit) {
+  const SensorModel& model = current_.sensor_model;
+  const Tile* tile = current_.tiles[slot].get();
+  const int before = tile == nullptr ? kUnknown : tile->log_odds_at(offset);
+  const int start = before == kUnknown ? 0 : before;
+  const int after = std::clamp(start + (is_hit ? model.hit : model.miss), model.min, model.max);
+  if (after == before) {
+    return false;
+  }
+  writable_tile(slot).set(offset, static_cast<std::int8_t>(after));
+  return true;
 }
 
 void Mapper::mark_free(const Box3d& region_m, Time stamp) {

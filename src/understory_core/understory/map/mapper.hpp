@@ -81,6 +81,7 @@ class Mapper {
   // Hits and misses of the window into the tiles; clones a tile only if a voxel of it changes.
   IntegrateCounts apply_window();
   IntegrateCounts apply_marks(TileSlot slot, const TileMarks& marks);
+  bool update_voxel(TileSlot slot, std::size_t offset, bool is_hit);  // whether it changed
   void integrate_depth_rays(const CameraView& view, const DepthView& depth);
   Tile& writable_tile(TileSlot slot);
 
