@@ -7,6 +7,7 @@
 #include <benchmark/benchmark.h>
 
 #include "understory/base/rng.hpp"
+#include "understory/sim/coverage_truth.hpp"
 #include "understory/sim/depth_noise.hpp"
 #include "understory/sim/depth_renderer.hpp"
 #include "understory/sim/forest_generator.hpp"
@@ -104,6 +105,16 @@ void generate(benchmark::State& state) {
     benchmark::DoNotOptimize(generate_forest(config, Rng(1)).trunks.data());
   }
 }
+void coverage_truth(benchmark::State& state) {
+  const ForestTruth truth(very_dense_forest());
+  const GridGeometry geometry(0.10, Box3d(Vector3d(-25, -25, 0), Vector3d(25, 25, 2)));
+  for (auto _ : state) {
+    const CoverageTruth coverage(truth, geometry, {Vector3d(0, 0, 1)}, CameraConfig{}, 0.20);
+    state.counters["voxels"] = static_cast<double>(coverage.voxel_count());
+  }
+}
+BENCHMARK(coverage_truth)->Name("CoverageTruth_Build/50x50x2")->Unit(benchmark::kMillisecond);
+
 BENCHMARK(generate)->Name("ForestGenerator_Generate/20480_trunks")->Unit(benchmark::kMillisecond);
 
 }  // namespace

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "understory/sim/forest_csv.hpp"
 
-#include <clocale>
+#include <filesystem>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -176,6 +176,26 @@ TEST(ForestCsv, GivesBackTheVeryForestThatWasGeneratedAndWritten) {
   for (std::size_t i = 0; i < read.trunks.size(); ++i) {
     EXPECT_EQ(read.trunks[i].center_m, forest.trunks[i].center_m);
     EXPECT_EQ(read.trunks[i].radius_m, forest.trunks[i].radius_m);
+  }
+}
+
+TEST(ForestCsv, ReadsThePublicForestsWhereTheyAreThere) {
+  const std::filesystem::path folder =
+      std::filesystem::path(UNDERSTORY_SOURCE_DIR) / ".." / "shared" / "forests";
+  if (!std::filesystem::is_directory(folder)) {
+    GTEST_SKIP() << folder << " is not there";
+  }
+
+  EXPECT_EQ(read_forest_csv(folder / "synthetic" / "forest_d020_s3.csv").trunks.size(), 500U);
+  EXPECT_EQ(read_forest_csv(folder / "rainier" / "rainier_AV02.csv").trunks.size(), 1388U);
+  for (const char* stand : {"AB08", "AG05", "AV02", "PP17", "TO11"}) {
+    const Forest forest =
+        read_forest_csv(folder / "rainier" / (std::string("rainier_") + stand + ".csv"));
+    const Forest scene = centered_crop(forest, {Vector2d(30, 30), Vector2d(70, 70)});
+    const Box2d box_m(Vector2d(-20, -20), Vector2d(20, 20));
+
+    EXPECT_GT(scene.trunks.size(), 20U) << stand;
+    EXPECT_TRUE(nearest_clear_point(scene, box_m, {0, 0}, 1.0).has_value()) << stand;
   }
 }
 

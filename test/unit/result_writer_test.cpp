@@ -177,7 +177,7 @@ TEST_F(ResultJson, HoldsEveryPromisedKeyInAFixedOrder) {
             "\"set_aside_targets\":0,\"replans\":0,\"counters\":{\"braked\":2},"
             "\"seed\":18446744073709551615,\"strategy\":\"explorer_collector\","
             "\"speed_cap\":\"paper\",\"scenario\":\"small\",\"commit\":\"abc\","
-            "\"explorer_speed_mps\":1.5,\"collector_speed_mps\":null,"
+            "\"vehicle_radius_m\":0.2,\"explorer_speed_mps\":1.5,\"collector_speed_mps\":null,"
             "\"yaw_rate_limit_radps\":null,"
             "\"box_m\":{\"min\":[-10.0,-10.0,0.0],\"max\":[10.0,10.0,2.0]},"
             "\"topview\":{\"x0_m\":-10.0,\"y0_m\":-10.0,\"cell_m\":0.1,\"width\":200,"

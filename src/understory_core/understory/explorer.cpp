@@ -11,9 +11,10 @@ namespace {
 // Routes keep a little more distance than trajectories must, so that smoothing has room.
 constexpr double kRouteExtraClearanceM = 0.04;
 
-std::unique_ptr<Strategy> make_strategy(const ExplorerConfig& config) {
-  const TravelRates rates{config.limits.limits_for(FlightMode::kCollector).speed_mps,
-                          config.limits.yaw_rate_radps};
+std::unique_ptr<Strategy> make_strategy(const ExplorerConfig& config,
+                                        const GridGeometry& geometry) {
+  const Limits limits = config.limits.limits_for(FlightMode::kCollector);
+  const TravelRates rates{limits.speed_mps, limits.acceleration_mps2, limits.yaw_rate_radps, geometry.box_m()};
   return std::make_unique<ExplorerCollector>(config.explorer_collector, rates);
 }
 
@@ -35,7 +36,7 @@ Explorer::Explorer(const ExplorerConfig& config, const GridGeometry& geometry)
       routes_(geometry,
               config.plan.vehicle_radius_m + config.plan.margin_m + kRouteExtraClearanceM),
       finder_(config.frontier, config.camera, geometry),
-      strategy_(make_strategy(config)),
+      strategy_(make_strategy(config, geometry)),
       set_aside_(duration_from_seconds(config.retry.set_aside_s), config.retry.max_tries) {}
 
 void Explorer::observe(const Pilot& pilot, const MapSnapshotPtr& snapshot) {

@@ -39,6 +39,7 @@ struct TrailConfig {
   double max_unknown_share = 0.05;
   double neighbour_distance_m = 0.5;
   double max_component_m3 = 2.0;
+  bool one_neighbour_is_trail = true;
 
   void visit(FieldVisitor& f) {
     f.field("ring_m", ring_m, in_range(0.05, 5.0), "width of the ring around a cluster's hull");
@@ -54,6 +55,9 @@ struct TrailConfig {
             max_component_m3,
             in_range(0.01, 1000.0),
             "unknown space that a cluster borders counts as its own small island up to here");
+    f.field("one_neighbour_is_trail",
+            one_neighbour_is_trail,
+            "a cluster with exactly one neighbour is a trail whatever it borders (the paper)");
   }
 };
 

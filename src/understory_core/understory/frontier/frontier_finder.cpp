@@ -160,7 +160,8 @@ void FrontierFinder::refresh(const ClearanceMap& map,
     }
     Cluster cluster = *member;
     if (relabel) {
-      const bool trail = neighbour_count(cluster) <= 1 ||
+      const std::size_t lone = config_.trails.one_neighbour_is_trail ? 1 : 0;
+      const bool trail = neighbour_count(cluster) <= lone ||
                          is_surrounded_by_free_space(map.snapshot(), cluster, config_.trails);
       cluster.label = trail ? ClusterLabel::kTrail : ClusterLabel::kFrontier;
     }

@@ -35,18 +35,20 @@ bool is_same_target(const ClusterPtr& target, const Candidate& candidate) {
 
 }  // namespace
 
-double ExplorerCollector::near_radius_m(FlightMode mode) const {
-  const double factor = mode == FlightMode::kCollector ? config_.mode.leave_factor : 1.0;
-  return factor * config_.mode.near_radius_m;
+// A trail within the radius that is worth the detour; both are wider for who is a Collector already.
+bool ExplorerCollector::is_near_trail(const StrategyInput& input,
+                                      const Candidate& candidate) const {
+  const double factor = input.mode == FlightMode::kCollector ? config_.mode.leave_factor : 1.0;
+  return candidate.cluster->is_trail() &&
+         candidate.route_length_m <= factor * config_.mode.near_radius_m &&
+         collector_cost(input, candidate) <= factor * config_.mode.max_detour_s;
 }
 
 FlightMode ExplorerCollector::select_mode(const StrategyInput& input) const {
-  const double radius_m = near_radius_m(input.mode);
   int near_trails = 0;
   const Cluster* counted = nullptr;
   for (const Candidate& candidate : input.candidates) {
-    if (candidate.cluster.get() != counted && candidate.cluster->is_trail() &&
-        candidate.route_length_m <= radius_m) {
+    if (candidate.cluster.get() != counted && is_near_trail(input, candidate)) {
       counted = candidate.cluster.get();
       ++near_trails;
     }
@@ -72,7 +74,16 @@ double ExplorerCollector::turn_angle(const StrategyInput& input, const Vector3d&
 double ExplorerCollector::greedy_cost(const Candidate& candidate) const {
   const ExplorerCostConfig& weights = config_.explorer;
   const double label_cost = candidate.cluster->is_trail() ? weights.trail_penalty : 0.0;
-  return weights.distance_weight * candidate.route_length_m + weights.label_weight * label_cost;
+  return weights.distance_weight * candidate.route_length_m + weights.label_weight * label_cost +
+         weights.ring_weight * ring_m(candidate.cluster->mean_m);
+}
+
+// Half the edge of the ring around the box's middle that a place lies on, rings having the box's
+// proportions.
+double ExplorerCollector::ring_m(const Vector3d& position_m) const {
+  const Vector2d half = 0.5 * rates_.box_m.sizes().head<2>();
+  const Vector2d offset = (position_m - rates_.box_m.center()).head<2>().cwiseAbs();
+  return offset.cwiseQuotient(half).maxCoeff() * half.mean();
 }
 
 double ExplorerCollector::explorer_cost(const StrategyInput& input,
@@ -87,7 +98,22 @@ double ExplorerCollector::collector_cost(const StrategyInput& input,
   const double yaw_time_s =
       std::abs(angle_difference(candidate.viewpoint.yaw_rad, input.vehicle.yaw_rad)) /
       rates_.yaw_rate_radps;
-  return config_.collector.path_weight * path_time_s + config_.collector.yaw_weight * yaw_time_s;
+  return config_.collector.path_weight * path_time_s + config_.collector.yaw_weight * yaw_time_s +
+         config_.collector.momentum_weight *
+             momentum_time_s(input, candidate.viewpoint.position_m);
+}
+
+// What of the velocity does not lead to the target has to be braked away first.
+double ExplorerCollector::momentum_time_s(const StrategyInput& input,
+                                          const Vector3d& position_m) const {
+  const Vector3d to_target = position_m - input.vehicle.position_m;
+  const Vector3d& velocity_mps = input.vehicle.velocity_mps;
+  if (to_target.norm() < 1e-6) {
+    return 0.0;
+  }
+  const double onward_mps = std::max(velocity_mps.dot(to_target.normalized()), 0.0);
+  return (velocity_mps - onward_mps * to_target.normalized()).norm() /
+         rates_.collector_acceleration_mps2;
 }
 
 std::optional<Candidate> ExplorerCollector::choose_as_explorer(const StrategyInput& input) const {
@@ -124,12 +150,9 @@ std::optional<Candidate> ExplorerCollector::choose_as_explorer(const StrategyInp
 }
 
 std::optional<Candidate> ExplorerCollector::choose_as_collector(const StrategyInput& input) const {
-  const double radius_m = near_radius_m(input.mode);
   return cheapest(
       input.candidates,
-      [&](const Candidate& candidate) {
-        return candidate.cluster->is_trail() && candidate.route_length_m <= radius_m;
-      },
+      [&](const Candidate& candidate) { return is_near_trail(input, candidate); },
       [&](const Candidate& candidate) {
         const double cost = collector_cost(input, candidate);
         return is_same_target(input.target, candidate) ? cost - config_.keep_target_bonus : cost;

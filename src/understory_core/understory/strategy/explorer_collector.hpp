@@ -15,6 +15,7 @@ struct ModeConfig {
   double near_radius_m = 8.0;
   int min_near_trails = 1;
   double leave_factor = 1.25;
+  double max_detour_s = 4.0;
 
   void visit(FieldVisitor& f) {
     f.field("near_radius_m",
@@ -28,7 +29,11 @@ struct ModeConfig {
     f.field("leave_factor",
             leave_factor,
             in_range(1.0, 10.0),
-            "a Collector stays one while trails are within this many radii");
+            "a Collector stays one while trails are within this many radii and detours");
+    f.field("max_detour_s",
+            max_detour_s,
+            in_range(0.1, 1000.0),
+            "a trail that costs a Collector more than this is no longer worth the detour");
   }
 };
 
@@ -37,6 +42,7 @@ struct ExplorerCostConfig {
   double direction_weight = 2.0;
   double label_weight = 1.0;
   double trail_penalty = 1.0;
+  double ring_weight = 0.0;
   double ahead_distance_m = 6.0;
   double ahead_angle_rad = 0.6;
   double greedy_distance_m = 10.0;
@@ -50,6 +56,11 @@ struct ExplorerCostConfig {
             "w_V, per radian between velocity and target");
     f.field("label_weight", label_weight, in_range(0.0, 1000.0), "w_L");
     f.field("trail_penalty", trail_penalty, in_range(-1000.0, 1000.0), "p_trail");
+    f.field("ring_weight",
+            ring_weight,
+            in_range(0.0, 1000.0),
+            "per metre that the cluster's square ring lies further out in the box: from the inside "
+            "outwards nothing is left behind; not in the paper");
     f.field("ahead_distance_m",
             ahead_distance_m,
             in_range(0.5, 1000.0),
@@ -72,10 +83,15 @@ struct ExplorerCostConfig {
 struct CollectorCostConfig {
   double path_weight = 1.0;
   double yaw_weight = 1.0;
+  double momentum_weight = 1.0;
 
   void visit(FieldVisitor& f) {
     f.field("path_weight", path_weight, in_range(0.0, 1000.0), "w_P, per second of flight");
     f.field("yaw_weight", yaw_weight, in_range(0.0, 1000.0), "w_A, per second of turning");
+    f.field("momentum_weight",
+            momentum_weight,
+            in_range(0.0, 1000.0),
+            "per second that it takes to turn the velocity towards the target; not in the paper");
   }
 };
 
@@ -101,10 +117,12 @@ struct ExplorerCollectorConfig {
   }
 };
 
-// What both modes' costs need to know of the vehicle.
+// What the costs need to know of vehicle and box.
 struct TravelRates {
   double collector_speed_mps = 1.5;
+  double collector_acceleration_mps2 = 1.0;
   double yaw_rate_radps = 0.9;
+  Box3d box_m{Vector3d::Constant(-10.0), Vector3d::Constant(10.0)};
 };
 
 class ExplorerCollector final : public Strategy {
@@ -120,7 +138,9 @@ class ExplorerCollector final : public Strategy {
   [[nodiscard]] double collector_cost(const StrategyInput& input, const Candidate& candidate) const;
 
  private:
-  [[nodiscard]] double near_radius_m(FlightMode mode) const;
+  [[nodiscard]] bool is_near_trail(const StrategyInput& input, const Candidate& candidate) const;
+  [[nodiscard]] double ring_m(const Vector3d& position_m) const;
+  [[nodiscard]] double momentum_time_s(const StrategyInput& input, const Vector3d& position_m) const;
   [[nodiscard]] double turn_angle(const StrategyInput& input, const Vector3d& position_m) const;
   [[nodiscard]] Candidate far_view_of(const StrategyInput& input, const Candidate& cheapest) const;
   [[nodiscard]] std::optional<Candidate> choose_as_explorer(const StrategyInput& input) const;

@@ -98,6 +98,7 @@ Json scene_json(const MissionResult& result) {
   scene["speed_cap"] = result.speed_cap;
   scene["scenario"] = result.scenario;
   scene["commit"] = result.commit;
+  scene["vehicle_radius_m"] = rounded(result.vehicle_radius_m);
   scene["explorer_speed_mps"] = rounded(result.explorer_speed_mps);
   scene["collector_speed_mps"] = rounded(result.collector_speed_mps);
   scene["yaw_rate_limit_radps"] = rounded(result.yaw_rate_limit_radps);

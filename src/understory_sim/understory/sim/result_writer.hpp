@@ -81,6 +81,7 @@ struct MissionResult {
   std::string speed_cap;
   std::string scenario;
   std::string commit;
+  double vehicle_radius_m = 0.20;            // nearer to a trunk than this is a collision
   std::optional<double> explorer_speed_mps;  // limits in force, drawn in the report
   std::optional<double> collector_speed_mps;
   std::optional<double> yaw_rate_limit_radps;

@@ -1,0 +1,90 @@
+// Copyright 2026 the Understory authors
+// SPDX-License-Identifier: BSD-3-Clause
+//
+// One mission in lockstep: physics and control law at 500 Hz, setpoints at 100 Hz, camera, map and
+// decisions at the camera's rate, all on one thread and one virtual clock. The same configuration,
+// forest and seed give the same flight, bit for bit. World frame, SI units. Construction throws on
+// wrong configuration; flying does not throw.
+#pragma once
+
+#include <functional>
+
+#include "understory/autopilot/control_law.hpp"
+#include "understory/base/rng.hpp"
+#include "understory/map/mapper.hpp"
+#include "understory/mission.hpp"
+#include "understory/sim/depth_renderer.hpp"
+#include "understory/sim/simulation_config.hpp"
+#include "understory/sim/stage_times.hpp"
+
+namespace understory {
+
+struct LockstepFrame {
+  Time time{};
+  MapSnapshotPtr map;
+  MissionStep step;
+};
+
+class Lockstep {
+ public:
+  using StepHook = std::function<void(Time, const VehicleState&)>;
+
+  // `resumed`: go on from this map instead of an unknown one. `on_step` sees the true vehicle at
+  // every physics step; `times` collects wall times per stage.
+  Lockstep(const SimulationConfig& config,
+           const Forest& forest,
+           const Rng& rng,
+           const MapSnapshot* resumed,
+           StepHook on_step,
+           StageTimes& times);
+
+  // Flies to the next exposure and through the decision that follows from it.
+  LockstepFrame advance();
+
+  // The autopilot has set the vehicle down, or it hovers where it was stopped, or it has had ample
+  // time for either.
+  [[nodiscard]] bool is_over() const;
+  void stop(StopReason reason) { mission_.stop(reason, now_); }
+
+  [[nodiscard]] Time now() const { return now_; }
+  [[nodiscard]] const Mission& mission() const { return mission_; }
+  [[nodiscard]] const VehicleState& vehicle() const { return vehicle_.state(); }
+  [[nodiscard]] std::uint64_t skipped_frames() const { return skipped_frames_; }
+
+ private:
+  struct Stages {
+    explicit Stages(StageTimes& times);
+    StageTimes::Stage flight;
+    StageTimes::Stage camera;
+    StageTimes::Stage map;
+    StageTimes::Stage update;    // frontiers and checks, no decision due
+    StageTimes::Stage decision;  // the same, and target and trajectory
+  };
+
+  void fly_until(Time exposure);
+  [[nodiscard]] DepthImage expose(const Pose& world_from_optical);
+  [[nodiscard]] MissionStep decide(const MapSnapshotPtr& map);
+  [[nodiscard]] Setpoint setpoint_now();
+
+  SimulationConfig config_;
+  StepHook on_step_;
+  StageTimes& times_;
+  Stages stages_;
+  Vehicle vehicle_;
+  ControlLaw law_;
+  DepthRenderer renderer_;
+  CameraModel camera_;
+  Pose body_from_optical_;
+  Rng noise_rng_;
+  Mapper mapper_;
+  Mission mission_;
+  Time now_{};
+  std::int64_t frame_ = 0;
+  Setpoint setpoint_;
+  Time setpoint_time_{};
+  DepthImage image_;
+  Time over_since_{};
+  std::uint64_t skipped_frames_ = 0;
+};
+
+}  // namespace understory

@@ -1,0 +1,84 @@
+// Copyright 2026 the Understory authors
+// SPDX-License-Identifier: BSD-3-Clause
+#include "understory/sim/simulation_config.hpp"
+
+#include "understory/sim/forest_csv.hpp"
+#include "understory/sim/mesh_reader.hpp"
+
+namespace understory {
+namespace {
+
+Box2d extent_of(const Forest& forest) {
+  Box2d extent;
+  for (const Trunk& trunk : forest.trunks) {
+    extent.extend(trunk.center_m);
+  }
+  return extent;
+}
+
+Forest cropped_to_scene(const Forest& forest, SceneConfig& scene) {
+  CropConfig& crop = scene.crop;
+  BoxConfig& box = scene.box;
+  if (scene.crop_mode == "center") {
+    crop.width_m = box.x_max_m - box.x_min_m;
+    crop.height_m = box.y_max_m - box.y_min_m;
+    const Vector2d middle = extent_of(forest).center();
+    crop.x0_m = middle.x() - 0.5 * crop.width_m;
+    crop.y0_m = middle.y() - 0.5 * crop.height_m;
+  }
+  const Vector2d corner(crop.x0_m, crop.y0_m);
+  const Vector2d size(crop.width_m, crop.height_m);
+  Forest piece = centered_crop(forest, Box2d(corner, Vector2d(corner + size)));
+  if (piece.trunks.empty()) {
+    throw ForestError(scene.forest_file + ": the crop holds no trunk");
+  }
+  box.x_min_m = -0.5 * size.x();
+  box.x_max_m = 0.5 * size.x();
+  box.y_min_m = -0.5 * size.y();
+  box.y_max_m = 0.5 * size.y();
+  return piece;
+}
+
+}  // namespace
+
+Box3d BoxConfig::box_m() const {
+  const Box3d box(Vector3d(x_min_m, y_min_m, z_min_m), Vector3d(x_max_m, y_max_m, z_max_m));
+  if (box.isEmpty() || box.sizes().minCoeff() <= 0.0) {
+    throw ConfigError("scene.box: each minimum must lie below its maximum");
+  }
+  return box;
+}
+
+Forest build_forest(SceneConfig& scene, const Rng& rng) {
+  Forest forest;
+  if (scene.source == "generated") {
+    forest = generate_forest(scene.generator, rng);
+  } else {
+    if (scene.forest_file.empty()) {
+      throw ConfigError(
+          "scene.forest_file: needed with scene.source: file (or give --forest FILE)");
+    }
+    forest = read_forest_csv(scene.forest_file);
+    if (scene.crop_mode != "none") {
+      forest = cropped_to_scene(forest, scene);
+    }
+  }
+  if (!scene.mesh_file.empty()) {
+    forest.meshes.push_back(read_mesh(scene.mesh_file));
+  }
+  const Box3d box = scene.box.box_m();
+  const std::optional<Vector2d> start =
+      nearest_clear_point(forest,
+                          Box2d(Vector2d(box.min().head<2>()), Vector2d(box.max().head<2>())),
+                          Vector2d(scene.start.x_m, scene.start.y_m),
+                          scene.start.clearance_m);
+  if (!start) {
+    throw ForestError("scene.start: no point of the box has " +
+                      std::to_string(scene.start.clearance_m) + " m clearance to every trunk");
+  }
+  scene.start.x_m = start->x();
+  scene.start.y_m = start->y();
+  return forest;
+}
+
+}  // namespace understory
