@@ -49,6 +49,7 @@ const char* to_string(StopReason reason) {
   return "?";
 }
 
+// NOLINTNEXTLINE(readability-function-size): all that a mission starts from, once
 Mission::Mission(const MissionConfig& config,
                  const ExplorerConfig& explorer,
                  const GridGeometry& geometry,

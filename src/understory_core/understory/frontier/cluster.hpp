@@ -19,8 +19,8 @@ enum class ClusterLabel : std::uint8_t { kFrontier, kTrail };
 struct Viewpoint {
   RouteLattice::Node node;
   Vector3d position_m;
-  double yaw_rad;
-  double coverage;  // share of the cluster in view and unoccluded, 0 .. 1
+  double yaw_rad = 0.0;
+  double coverage = 0.0;  // share of the cluster in view and unoccluded, 0 .. 1
 };
 
 struct Cluster {

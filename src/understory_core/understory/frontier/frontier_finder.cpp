@@ -120,8 +120,9 @@ std::vector<std::uint32_t> FrontierFinder::form_clusters(const std::vector<Voxel
       for (const VoxelIndex& voxel : cluster.voxels) {
         set_owner(voxel, cluster.id);
       }
-      formed.push_back(cluster.id);
-      members_[cluster.id] = std::make_shared<const Cluster>(std::move(cluster));
+      const std::uint32_t id = cluster.id;
+      formed.push_back(id);
+      members_[id] = std::make_shared<const Cluster>(std::move(cluster));
     }
   }
   return formed;

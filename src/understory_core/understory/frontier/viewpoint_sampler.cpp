@@ -78,10 +78,12 @@ std::vector<RouteLattice::Node> ViewpointSampler::candidates(const ClearanceMap&
   const RouteLattice& lattice = routes.lattice();
   const int layers = lattice.count().z();
   std::vector<std::size_t> indices;
-  for (double radius_m = config_.min_radius_m; radius_m <= config_.max_radius_m + 1e-6;
-       radius_m += config_.radius_step_m) {
-    for (double angle_rad = 0.0; angle_rad < 2.0 * kPi - 1e-6;
-         angle_rad += config_.angle_step_rad) {
+  const double rings = (config_.max_radius_m - config_.min_radius_m) / config_.radius_step_m;
+  const double spokes = 2.0 * kPi / config_.angle_step_rad;
+  for (int ring = 0; ring <= rings + 1e-6; ++ring) {
+    const double radius_m = config_.min_radius_m + ring * config_.radius_step_m;
+    for (int spoke = 0; spoke < spokes - 1e-6; ++spoke) {
+      const double angle_rad = spoke * config_.angle_step_rad;
       const Vector3d point =
           cluster.mean_m + radius_m * Vector3d(std::cos(angle_rad), std::sin(angle_rad), 0.0);
       const RouteLattice::Node middle = lattice.nearest(point);

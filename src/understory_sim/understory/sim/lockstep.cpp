@@ -30,6 +30,7 @@ Lockstep::Stages::Stages(StageTimes& times)
       update(times.stage("update")),
       decision(times.stage("decision")) {}
 
+// NOLINTNEXTLINE(readability-function-size): all that a mission is made of, once
 Lockstep::Lockstep(const SimulationConfig& config,
                    const Forest& forest,
                    const Rng& rng,

@@ -48,10 +48,17 @@ void print_parameters() {
       renderer->text());
 }
 
+// In the project, or installed beside understory_config.
+std::string report_script() {
+  const fs::path root(project_root());
+  const fs::path installed = root / "../understory_sim/report/report.py";
+  return (fs::exists(installed) ? installed : root / "src/understory_sim/report/report.py")
+      .string();
+}
+
 // Runs the report script; false when it fails. No shell: the folder's name may hold anything.
 bool make_report(const std::string& folder) {
-  const std::string script =
-      (fs::path(project_root()) / "src/understory_sim/report/report.py").string();
+  const std::string script = report_script();
   static_cast<void>(std::fflush(nullptr));
   const pid_t child = fork();
   if (child == 0) {
