@@ -24,7 +24,8 @@ struct Bench {
   const std::vector<ClusterPtr>& update(SnapshotBuilder& builder) {
     snapshot = builder.build();
     clearance.update(snapshot);
-    return finder.update(clearance, snapshot, routes);
+    finder.observe(snapshot);
+    return finder.form(clearance, routes);
   }
 
   ClearanceMap clearance;

@@ -14,7 +14,8 @@ constexpr double kRouteExtraClearanceM = 0.04;
 std::unique_ptr<Strategy> make_strategy(const ExplorerConfig& config,
                                         const GridGeometry& geometry) {
   const Limits limits = config.limits.limits_for(FlightMode::kCollector);
-  const TravelRates rates{limits.speed_mps, limits.acceleration_mps2, limits.yaw_rate_radps, geometry.box_m()};
+  const TravelRates rates{
+      limits.speed_mps, limits.acceleration_mps2, limits.yaw_rate_radps, geometry.box_m()};
   return std::make_unique<ExplorerCollector>(config.explorer_collector, rates);
 }
 
@@ -39,8 +40,8 @@ Explorer::Explorer(const ExplorerConfig& config, const GridGeometry& geometry)
       strategy_(make_strategy(config, geometry)),
       set_aside_(duration_from_seconds(config.retry.set_aside_s), config.retry.max_tries) {}
 
-void Explorer::observe(const Pilot& pilot, const MapSnapshotPtr& snapshot) {
-  finder_.update(pilot.clearance(), snapshot, routes_);
+void Explorer::observe(const MapSnapshotPtr& snapshot) {
+  finder_.observe(snapshot);
 }
 
 // Drops a target that has been seen; sets one aside that takes too long or shows nothing new.
@@ -184,6 +185,7 @@ ExploreStep Explorer::decide(Pilot& pilot, Time now, bool in_danger) {
   step.decided = true;
   ++counters_.decisions;
   last_decision_ = now;
+  finder_.form(pilot.clearance(), routes_);
   for (const Reach reach : {Reach::kNear, Reach::kAll, Reach::kAllAndSetAside}) {
     const StrategyInput input = gather(pilot, now, reach);
     counters_.full_searches += reach == Reach::kAll ? 1U : 0U;

@@ -42,8 +42,8 @@ class Explorer {
  public:
   Explorer(const ExplorerConfig& config, const GridGeometry& geometry);
 
-  // Frontiers only; for the phases of a mission that do not explore.
-  void observe(const Pilot& pilot, const MapSnapshotPtr& snapshot);
+  // With every map update: what is frontier now. Clusters are formed when a decision is due.
+  void observe(const MapSnapshotPtr& snapshot);
   // Call after observe(), with the pilot on the same map.
   ExploreStep step(Pilot& pilot, Time now);
 

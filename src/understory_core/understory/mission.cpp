@@ -181,7 +181,7 @@ TrajectoryPtr Mission::descend(Time now) {
 MissionStep Mission::on_map(const MapSnapshotPtr& snapshot, Time now) {
   MissionStep step;
   pilot_.update_map(snapshot);
-  explorer_.observe(pilot_, snapshot);
+  explorer_.observe(snapshot);
   if (reason_ == StopReason::kNone && to_seconds(now) >= config_.time_limit_s) {
     stop(StopReason::kTimeLimit, now);
   }

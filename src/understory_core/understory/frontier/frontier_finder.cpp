@@ -3,6 +3,7 @@
 #include "understory/frontier/frontier_finder.hpp"
 
 #include <algorithm>
+#include <iterator>
 #include <set>
 
 #include "understory/frontier/clustering.hpp"
@@ -57,12 +58,18 @@ void FrontierFinder::set_owner(const VoxelIndex& voxel, std::uint32_t owner) {
 
 // Takes apart every cluster that lost a voxel or that a new voxel touches, and returns the frontier
 // voxels that have no cluster now.
-std::vector<VoxelIndex> FrontierFinder::dissolve(const FrontierField::Change& change) {
+std::vector<VoxelIndex> FrontierFinder::dissolve() {
   std::set<std::uint32_t> affected;
-  for (const VoxelIndex& voxel : change.removed) {
+  for (const VoxelIndex& voxel : pending_.removed) {
     affected.insert(owner_of(voxel));
   }
-  for (const VoxelIndex& voxel : change.added) {
+  // What came and went again since the last time is of no account.
+  pending_.added.erase(
+      std::remove_if(pending_.added.begin(),
+                     pending_.added.end(),
+                     [this](const VoxelIndex& voxel) { return !field_.contains(voxel); }),
+      pending_.added.end());
+  for (const VoxelIndex& voxel : pending_.added) {
     for_each_of_26_neighbours(voxel, [&](const VoxelIndex& neighbour) {
       const std::uint32_t owner = owner_of(neighbour);
       if (owner != kNoOwner) {
@@ -83,7 +90,7 @@ std::vector<VoxelIndex> FrontierFinder::dissolve(const FrontierField::Change& ch
     }
     members_.erase(member);
   }
-  for (const VoxelIndex& voxel : change.added) {
+  for (const VoxelIndex& voxel : pending_.added) {
     set_owner(voxel, kPooled);
     pool.push_back(voxel);
   }
@@ -140,22 +147,36 @@ std::size_t FrontierFinder::neighbour_count(const Cluster& cluster) const {
   return count;
 }
 
+bool FrontierFinder::map_changed_within(double distance_m, const Cluster& cluster) const {
+  return std::any_of(pending_.tiles.begin(), pending_.tiles.end(), [&](TileSlot slot) {
+    const VoxelBox voxels = geometry_.voxels_of_slot(slot);
+    const Box3d tile_m(voxels.min.cast<double>() * geometry_.resolution_m(),
+                       voxels.end.cast<double>() * geometry_.resolution_m());
+    return tile_m.squaredExteriorDistance(cluster.bounds_m) <= distance_m * distance_m;
+  });
+}
+
 // Labels and viewpoints of what is new; labels of its neighbours; another try for the dormant.
 void FrontierFinder::refresh(const ClearanceMap& map,
                              const RouteSearch& routes,
-                             const Box3d& changed_m,
                              const std::vector<std::uint32_t>& formed) {
-  const double label_reach_m = config_.trails.ring_m + config_.trails.neighbour_distance_m;
-  const double view_reach_m = config_.viewpoints.max_radius_m + map.max_distance_m();
+  const double reach_m = config_.trails.ring_m + config_.trails.neighbour_distance_m;
+  const double view_reach_m = config_.viewpoints.max_radius_m;
+  const auto is_formed = [&](std::uint32_t id) {
+    return std::binary_search(formed.begin(), formed.end(), id);
+  };
   for (auto& [id, member] : members_) {
     if (member->voxels.size() < static_cast<std::size_t>(config_.min_cluster_voxels)) {
       continue;
     }
-    const bool is_new = std::binary_search(formed.begin(), formed.end(), id);
-    const double distance_m = changed_m.isEmpty() ? std::numeric_limits<double>::infinity()
-                                                  : changed_m.exteriorDistance(member->bounds_m);
-    const bool relabel = is_new || distance_m <= label_reach_m;
-    const bool resample = is_new || (member->is_dormant() && distance_m <= view_reach_m);
+    const bool is_new = is_formed(id);
+    const bool relabel =
+        is_new || std::any_of(formed.begin(), formed.end(), [&, &cluster = *member](auto other) {
+          return members_.at(other)->bounds_m.squaredExteriorDistance(cluster.bounds_m) <=
+                 reach_m * reach_m;
+        });
+    const bool resample =
+        is_new || (member->is_dormant() && map_changed_within(view_reach_m, *member));
     if (!relabel && !resample) {
       continue;
     }
@@ -173,18 +194,24 @@ void FrontierFinder::refresh(const ClearanceMap& map,
   }
 }
 
-const std::vector<ClusterPtr>& FrontierFinder::update(const ClearanceMap& map,
-                                                      const MapSnapshotPtr& snapshot,
-                                                      const RouteSearch& routes) {
+void FrontierFinder::observe(const MapSnapshotPtr& snapshot) {
   const FrontierField::Change change = field_.update(snapshot);
-  const std::vector<std::uint32_t> formed = form_clusters(dissolve(change));
-  Box3d changed_m;
-  for (const TileSlot slot : change.tiles) {
-    const VoxelBox voxels = geometry_.voxels_of_slot(slot);
-    changed_m.extend(voxels.min.cast<double>() * geometry_.resolution_m());
-    changed_m.extend(voxels.end.cast<double>() * geometry_.resolution_m());
-  }
-  refresh(map, routes, changed_m, formed);
+  pending_.added.insert(pending_.added.end(), change.added.begin(), change.added.end());
+  pending_.removed.insert(pending_.removed.end(), change.removed.begin(), change.removed.end());
+  std::vector<TileSlot> tiles;
+  std::set_union(pending_.tiles.begin(),
+                 pending_.tiles.end(),
+                 change.tiles.begin(),
+                 change.tiles.end(),
+                 std::back_inserter(tiles));
+  pending_.tiles = std::move(tiles);
+}
+
+const std::vector<ClusterPtr>& FrontierFinder::form(const ClearanceMap& map,
+                                                    const RouteSearch& routes) {
+  const std::vector<std::uint32_t> formed = form_clusters(dissolve());
+  refresh(map, routes, formed);
+  pending_ = {};
   clusters_.clear();
   for (const auto& [id, member] : members_) {
     if (member->voxels.size() >= static_cast<std::size_t>(config_.min_cluster_voxels)) {

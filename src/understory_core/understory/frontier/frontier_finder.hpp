@@ -26,10 +26,12 @@ class FrontierFinder {
                  const CameraConfig& camera,
                  const GridGeometry& geometry);
 
-  // The clusters as of the clearance map's snapshot, ascending by id, dormant ones included.
-  const std::vector<ClusterPtr>& update(const ClearanceMap& map,
-                                        const MapSnapshotPtr& snapshot,
-                                        const RouteSearch& routes);
+  // Which voxels are frontier, as of this snapshot. Cheap, for every map update; clusters lag
+  // behind until the next form().
+  void observe(const MapSnapshotPtr& snapshot);
+  // The clusters as of the last observe(), ascending by id, dormant ones included. `map` is of the
+  // same snapshot.
+  const std::vector<ClusterPtr>& form(const ClearanceMap& map, const RouteSearch& routes);
 
   [[nodiscard]] const std::vector<ClusterPtr>& clusters() const { return clusters_; }
 
@@ -45,13 +47,13 @@ class FrontierFinder {
 
   [[nodiscard]] std::uint32_t owner_of(const VoxelIndex& voxel) const;
   void set_owner(const VoxelIndex& voxel, std::uint32_t owner);
-  std::vector<VoxelIndex> dissolve(const FrontierField::Change& change);
+  std::vector<VoxelIndex> dissolve();
   std::vector<std::uint32_t> form_clusters(const std::vector<VoxelIndex>& pool);
   std::vector<VoxelIndex> grow_component(const VoxelIndex& seed);
   void refresh(const ClearanceMap& map,
                const RouteSearch& routes,
-               const Box3d& changed_m,
                const std::vector<std::uint32_t>& formed);
+  [[nodiscard]] bool map_changed_within(double distance_m, const Cluster& cluster) const;
   [[nodiscard]] std::size_t neighbour_count(const Cluster& cluster) const;
 
   FrontierConfig config_;
@@ -59,6 +61,7 @@ class FrontierFinder {
   double max_range_m_;
   GridGeometry geometry_;
   FrontierField field_;
+  FrontierField::Change pending_;                // since the last form()
   std::vector<std::unique_ptr<Owners>> owners_;  // cluster id per voxel
   std::map<std::uint32_t, ClusterPtr> members_;  // all clusters, too small ones as well
   std::uint32_t next_id_ = 2;                    // 0: no owner, 1: pooled

@@ -8,7 +8,7 @@
 namespace understory {
 namespace {
 
-constexpr std::size_t kSampledVoxels = 20;  // of a cluster, evenly spread over its list
+constexpr std::size_t kSampledVoxels = 12;  // of a cluster, evenly spread over its list
 constexpr double kFovMargin = 0.95;         // a voxel at the very edge of the image does not count
 
 struct YawChoice {

@@ -35,7 +35,8 @@ bool is_same_target(const ClusterPtr& target, const Candidate& candidate) {
 
 }  // namespace
 
-// A trail within the radius that is worth the detour; both are wider for who is a Collector already.
+// A trail within the radius that is worth the detour; both are wider for who is a Collector
+// already.
 bool ExplorerCollector::is_near_trail(const StrategyInput& input,
                                       const Candidate& candidate) const {
   const double factor = input.mode == FlightMode::kCollector ? config_.mode.leave_factor : 1.0;
@@ -99,8 +100,7 @@ double ExplorerCollector::collector_cost(const StrategyInput& input,
       std::abs(angle_difference(candidate.viewpoint.yaw_rad, input.vehicle.yaw_rad)) /
       rates_.yaw_rate_radps;
   return config_.collector.path_weight * path_time_s + config_.collector.yaw_weight * yaw_time_s +
-         config_.collector.momentum_weight *
-             momentum_time_s(input, candidate.viewpoint.position_m);
+         config_.collector.momentum_weight * momentum_time_s(input, candidate.viewpoint.position_m);
 }
 
 // What of the velocity does not lead to the target has to be braked away first.
@@ -181,9 +181,8 @@ Candidate ExplorerCollector::far_view_of(const StrategyInput& input,
 
 std::optional<Target> ExplorerCollector::choose(const StrategyInput& input) const {
   const FlightMode mode = select_mode(input);
-  const std::optional<Candidate> candidate = mode == FlightMode::kCollector
-                                                 ? choose_as_collector(input)
-                                                 : choose_as_explorer(input);
+  const std::optional<Candidate> candidate =
+      mode == FlightMode::kCollector ? choose_as_collector(input) : choose_as_explorer(input);
   if (!candidate) {
     return std::nullopt;
   }

@@ -140,7 +140,8 @@ class ExplorerCollector final : public Strategy {
  private:
   [[nodiscard]] bool is_near_trail(const StrategyInput& input, const Candidate& candidate) const;
   [[nodiscard]] double ring_m(const Vector3d& position_m) const;
-  [[nodiscard]] double momentum_time_s(const StrategyInput& input, const Vector3d& position_m) const;
+  [[nodiscard]] double momentum_time_s(const StrategyInput& input,
+                                       const Vector3d& position_m) const;
   [[nodiscard]] double turn_angle(const StrategyInput& input, const Vector3d& position_m) const;
   [[nodiscard]] Candidate far_view_of(const StrategyInput& input, const Candidate& cheapest) const;
   [[nodiscard]] std::optional<Candidate> choose_as_explorer(const StrategyInput& input) const;
