@@ -6,7 +6,7 @@
 
 #include <fmt/core.h>
 
-#include "understory/simulate/mission_run.hpp"
+#include "understory/sim/mission_run.hpp"
 
 namespace understory {
 

@@ -15,7 +15,7 @@
 #include "understory/map/octomap_io.hpp"
 #include "understory/simulate/batch.hpp"
 #include "understory/simulate/live_line.hpp"
-#include "understory/simulate/mission_run.hpp"
+#include "understory/sim/mission_run.hpp"
 #include "understory/simulate/options.hpp"
 
 namespace understory {

@@ -1,6 +1,6 @@
 // Copyright 2026 the Understory authors
 // SPDX-License-Identifier: BSD-3-Clause
-#include "understory/simulate/mission_run.hpp"
+#include "understory/sim/mission_run.hpp"
 
 #include <algorithm>
 #include <chrono>
