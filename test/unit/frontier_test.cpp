@@ -235,7 +235,7 @@ TEST(TrailLabel, BorderOfALargeUnknownRegionIsAFrontier) {
 
   std::size_t frontiers = 0;
   for (const ClusterPtr& cluster : bench.update(builder)) {
-    EXPECT_FALSE(is_surrounded_by_free_space(*bench.snapshot, *cluster, TrailConfig{}));
+    EXPECT_FALSE(surroundings_of(*bench.snapshot, *cluster, TrailConfig{}).is_free_all_around);
     frontiers += cluster->is_trail() ? 0U : 1U;
   }
   // The two at the ends have one neighbour each, so they are trails (paper, III-A).
@@ -259,7 +259,7 @@ TEST(TrailLabel, DoesNotDependOnTheMapsAxes) {
     }
     const Cluster cluster = make_cluster(std::move(voxels), map->geometry);
 
-    EXPECT_TRUE(is_surrounded_by_free_space(*map, cluster, TrailConfig{})) << angle_rad;
+    EXPECT_TRUE(surroundings_of(*map, cluster, TrailConfig{}).is_free_all_around) << angle_rad;
   }
 }
 
@@ -277,7 +277,7 @@ TEST(TrailLabel, IslandBesideForeignUnknownSpaceIsNotSurrounded) {
   }
 
   EXPECT_FALSE(
-      is_surrounded_by_free_space(*map, make_cluster(voxels, map->geometry), TrailConfig{}));
+      surroundings_of(*map, make_cluster(voxels, map->geometry), TrailConfig{}).is_free_all_around);
 }
 
 TEST(ConvexHull, DistanceIsZeroInsideAndEuclideanOutside) {

@@ -36,6 +36,7 @@ Explorer::Explorer(const ExplorerConfig& config, const GridGeometry& geometry)
     : config_(config),
       routes_(geometry,
               config.plan.vehicle_radius_m + config.plan.margin_m + kRouteExtraClearanceM),
+      tight_routes_(geometry, config.plan.vehicle_radius_m + config.plan.margin_m),
       finder_(config.frontier, config.camera, geometry),
       strategy_(make_strategy(config, geometry)),
       set_aside_(duration_from_seconds(config.retry.set_aside_s), config.retry.max_tries) {}
@@ -104,7 +105,7 @@ StrategyInput Explorer::gather(const Pilot& pilot, Time now, Reach reach) {
   std::vector<RouteLattice::Node> nodes;
   for (const ClusterPtr& cluster : finder_.clusters()) {
     if (set_aside_.is_given_up(*cluster) ||
-        (reach != Reach::kAllAndSetAside && set_aside_.is_waiting(*cluster, now))) {
+        (reach < Reach::kAllAndSetAside && set_aside_.is_waiting(*cluster, now))) {
       continue;
     }
     for (const Viewpoint& viewpoint : cluster->viewpoints) {
@@ -116,9 +117,10 @@ StrategyInput Explorer::gather(const Pilot& pilot, Time now, Reach reach) {
   }
   const double max_length_m =
       reach == Reach::kNear ? config_.replan.near_route_m : std::numeric_limits<double>::infinity();
-  routes_.run(pilot.clearance(), input.vehicle.position_m, nodes, max_length_m);
-  const auto unreachable = [this](Candidate& candidate) {
-    const std::optional<double> length_m = routes_.length_m(candidate.viewpoint.node);
+  RouteSearch& routes = reach == Reach::kThroughTightGaps ? tight_routes_ : routes_;
+  routes.run(pilot.clearance(), input.vehicle.position_m, nodes, max_length_m);
+  const auto unreachable = [&routes](Candidate& candidate) {
+    const std::optional<double> length_m = routes.length_m(candidate.viewpoint.node);
     candidate.route_length_m = length_m.value_or(0.0);
     return !length_m.has_value();
   };
@@ -146,7 +148,8 @@ bool Explorer::is_on_the_way_to(const Target& target, const Pilot& pilot) const 
 }
 
 // Null: what is flown goes there already, or none of the targets tried can be flown to.
-TrajectoryPtr Explorer::try_targets(Pilot& pilot, StrategyInput input, Time now, bool in_danger) {
+TrajectoryPtr Explorer::try_targets(
+    Pilot& pilot, const RouteSearch& routes, StrategyInput input, Time now, bool in_danger) {
   for (int attempt = 0; attempt < config_.replan.max_attempts; ++attempt) {
     const std::optional<Target> target = strategy_->choose(input);
     if (!target) {
@@ -156,7 +159,7 @@ TrajectoryPtr Explorer::try_targets(Pilot& pilot, StrategyInput input, Time now,
       return nullptr;
     }
     const Result<TrajectoryPtr, PlanError> flown =
-        pilot.fly({routes_.route_m(target->candidate.viewpoint.node),
+        pilot.fly({routes.route_m(target->candidate.viewpoint.node),
                    target->candidate.viewpoint.yaw_rad,
                    target->mode,
                    config_.limits.limits_for(target->mode)},
@@ -186,13 +189,15 @@ ExploreStep Explorer::decide(Pilot& pilot, Time now, bool in_danger) {
   ++counters_.decisions;
   last_decision_ = now;
   finder_.form(pilot.clearance(), routes_);
-  for (const Reach reach : {Reach::kNear, Reach::kAll, Reach::kAllAndSetAside}) {
+  for (const Reach reach :
+       {Reach::kNear, Reach::kAll, Reach::kAllAndSetAside, Reach::kThroughTightGaps}) {
     const StrategyInput input = gather(pilot, now, reach);
     counters_.full_searches += reach == Reach::kAll ? 1U : 0U;
     if (!strategy_->choose(input)) {
       continue;
     }
-    step.published = try_targets(pilot, input, now, in_danger);
+    step.published = try_targets(
+        pilot, reach == Reach::kThroughTightGaps ? tight_routes_ : routes_, input, now, in_danger);
     return step;
   }
   step.status = ExploreStatus::kNothingLeft;

@@ -53,9 +53,11 @@ class Explorer {
   [[nodiscard]] const ExplorerCounters& counters() const { return counters_; }
   [[nodiscard]] const SetAsideList& set_aside() const { return set_aside_; }
   [[nodiscard]] RouteSearch& routes() { return routes_; }
+  // For who is boxed in: routes with no more room than a trajectory must have.
+  [[nodiscard]] RouteSearch& tight_routes() { return tight_routes_; }
 
  private:
-  enum class Reach : std::uint8_t { kNear, kAll, kAllAndSetAside };
+  enum class Reach : std::uint8_t { kNear, kAll, kAllAndSetAside, kThroughTightGaps };
 
   [[nodiscard]] bool is_due(const Pilot& pilot, Time now) const;
   [[nodiscard]] bool reaches_target(const Pilot& pilot) const;
@@ -63,14 +65,13 @@ class Explorer {
   void review_target(const Pilot& pilot, Time now);
   [[nodiscard]] StrategyInput gather(const Pilot& pilot, Time now, Reach reach);
   ExploreStep decide(Pilot& pilot, Time now, bool in_danger);
-  [[nodiscard]] TrajectoryPtr try_targets(Pilot& pilot,
-                                          StrategyInput input,
-                                          Time now,
-                                          bool in_danger);
+  [[nodiscard]] TrajectoryPtr try_targets(
+      Pilot& pilot, const RouteSearch& routes, StrategyInput input, Time now, bool in_danger);
   void adopt(const Target& target, const Pilot& pilot, Time now);
 
   ExplorerConfig config_;
   RouteSearch routes_;
+  RouteSearch tight_routes_;
   FrontierFinder finder_;
   std::unique_ptr<Strategy> strategy_;
   SetAsideList set_aside_;

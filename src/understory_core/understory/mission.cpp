@@ -137,7 +137,7 @@ TrajectoryPtr Mission::fly_home(Time now) {
   TrajectoryPtr leg;
   if (in_danger || is_due) {
     last_leg_ = now;
-    RouteSearch& routes = explorer_.routes();
+    RouteSearch& routes = failed_legs_ % 2 == 0 ? explorer_.routes() : explorer_.tight_routes();
     const RouteLattice::Node home = routes.lattice().nearest(home_m_);
     routes.run(
         pilot_.clearance(), here.position_m, {home}, std::numeric_limits<double>::infinity());

@@ -29,6 +29,7 @@ struct Cluster {
   Vector3d mean_m = Vector3d::Zero();
   Box3d bounds_m;
   ClusterLabel label = ClusterLabel::kFrontier;
+  bool is_worthless = false;          // borders an island too small to be worth a visit
   std::vector<Viewpoint> viewpoints;  // best coverage first; none: dormant
 
   [[nodiscard]] bool is_dormant() const { return viewpoints.empty(); }

@@ -64,6 +64,7 @@ struct TrailConfig {
 struct FrontierConfig {
   double max_cluster_length_m = 2.0;
   int min_cluster_voxels = 40;
+  double min_island_m3 = 0.0;
   double seen_share = 0.2;
   ViewpointConfig viewpoints;
   TrailConfig trails;
@@ -77,6 +78,11 @@ struct FrontierConfig {
             min_cluster_voxels,
             in_range(1, 100000),
             "smaller clusters are no targets");
+    f.field("min_island_m3",
+            min_island_m3,
+            in_range(0.0, 1000.0),
+            "nor are clusters that border an island of unknown space smaller than this (a trunk's "
+            "inside counts)");
     f.field("seen_share",
             seen_share,
             in_range(0.01, 1.0),

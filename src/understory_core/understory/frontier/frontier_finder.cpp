@@ -183,9 +183,10 @@ void FrontierFinder::refresh(const ClearanceMap& map,
     Cluster cluster = *member;
     if (relabel) {
       const std::size_t lone = config_.trails.one_neighbour_is_trail ? 1 : 0;
-      const bool trail = neighbour_count(cluster) <= lone ||
-                         is_surrounded_by_free_space(map.snapshot(), cluster, config_.trails);
+      const Surroundings around = surroundings_of(map.snapshot(), cluster, config_.trails);
+      const bool trail = around.is_free_all_around || neighbour_count(cluster) <= lone;
       cluster.label = trail ? ClusterLabel::kTrail : ClusterLabel::kFrontier;
+      cluster.is_worthless = around.island_m3 && *around.island_m3 < config_.min_island_m3;
     }
     if (resample) {
       cluster.viewpoints = sampler_.sample(map, routes, cluster);
@@ -214,7 +215,8 @@ const std::vector<ClusterPtr>& FrontierFinder::form(const ClearanceMap& map,
   pending_ = {};
   clusters_.clear();
   for (const auto& [id, member] : members_) {
-    if (member->voxels.size() >= static_cast<std::size_t>(config_.min_cluster_voxels)) {
+    if (member->voxels.size() >= static_cast<std::size_t>(config_.min_cluster_voxels) &&
+        !member->is_worthless) {
       clusters_.push_back(member);
     }
   }

@@ -42,6 +42,7 @@ class UnknownIsland {
   }
 
   [[nodiscard]] bool is_small() const { return is_small_; }
+  [[nodiscard]] std::size_t voxel_count() const { return voxel_count_; }
   [[nodiscard]] bool contains(const VoxelIndex& voxel) const {
     return is_small_ && window_.contains(voxel) && seen_[offset(voxel)] != 0;
   }
@@ -88,6 +89,7 @@ class UnknownIsland {
         return false;
       }
     }
+    voxel_count_ = open.size();
     return true;
   }
 
@@ -95,19 +97,20 @@ class UnknownIsland {
   VoxelBox window_;
   std::vector<std::uint8_t> seen_;
   bool is_small_ = false;
+  std::size_t voxel_count_ = 0;
 };
 
 }  // namespace
 
-bool is_surrounded_by_free_space(const MapSnapshot& snapshot,
-                                 const Cluster& cluster,
-                                 const TrailConfig& config) {
+Surroundings surroundings_of(const MapSnapshot& snapshot,
+                             const Cluster& cluster,
+                             const TrailConfig& config) {
   const GridGeometry& geometry = snapshot.geometry;
   const double voxel_m3 = std::pow(geometry.resolution_m(), 3);
   const UnknownIsland island(
       snapshot, cluster, static_cast<std::size_t>(config.max_component_m3 / voxel_m3));
   if (!island.is_small()) {
-    return false;
+    return {};
   }
   std::vector<Vector2d> columns;
   for (const VoxelIndex& voxel : cluster.voxels) {
@@ -136,7 +139,8 @@ bool is_surrounded_by_free_space(const MapSnapshot& snapshot,
       }
     }
   }
-  return foreign_unknown <= config.max_unknown_share * in_ring;
+  return {foreign_unknown <= config.max_unknown_share * in_ring,
+          static_cast<double>(island.voxel_count()) * voxel_m3};
 }
 
 }  // namespace understory

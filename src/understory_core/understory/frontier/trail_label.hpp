@@ -7,14 +7,21 @@
 // map's axes. Pure function of snapshot and cluster; world frame, metres.
 #pragma once
 
+#include <optional>
+
 #include "understory/frontier/cluster.hpp"
 #include "understory/frontier/frontier_config.hpp"
 #include "understory/map/map_snapshot.hpp"
 
 namespace understory {
 
-[[nodiscard]] bool is_surrounded_by_free_space(const MapSnapshot& snapshot,
-                                               const Cluster& cluster,
-                                               const TrailConfig& config);
+struct Surroundings {
+  bool is_free_all_around = false;
+  std::optional<double> island_m3;  // of the unknown component bordered, if that is a small one
+};
+
+[[nodiscard]] Surroundings surroundings_of(const MapSnapshot& snapshot,
+                                           const Cluster& cluster,
+                                           const TrailConfig& config);
 
 }  // namespace understory

@@ -64,7 +64,8 @@ struct Tile {
   [[nodiscard]] static bool test(const std::array<std::uint16_t, kRowsPerTile>& rows,
                                  const VoxelIndex& voxel) {
     const std::size_t bit = static_cast<std::size_t>(voxel.x()) & 15U;
-    return ((rows[row_in_tile(voxel.y(), voxel.z())] >> bit) & 1U) != 0;
+    const unsigned row = rows[row_in_tile(voxel.y(), voxel.z())];
+    return ((row >> bit) & 1U) != 0;
   }
 };
 

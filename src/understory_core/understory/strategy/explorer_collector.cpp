@@ -72,11 +72,18 @@ double ExplorerCollector::turn_angle(const StrategyInput& input, const Vector3d&
   return std::acos(std::clamp(direction.dot(to_target.normalized()), -1.0, 1.0));
 }
 
-double ExplorerCollector::greedy_cost(const Candidate& candidate) const {
+double ExplorerCollector::yaw_time_s(const StrategyInput& input, const Candidate& candidate) const {
+  return std::abs(angle_difference(candidate.viewpoint.yaw_rad, input.vehicle.yaw_rad)) /
+         rates_.yaw_rate_radps;
+}
+
+double ExplorerCollector::greedy_cost(const StrategyInput& input,
+                                      const Candidate& candidate) const {
   const ExplorerCostConfig& weights = config_.explorer;
   const double label_cost = candidate.cluster->is_trail() ? weights.trail_penalty : 0.0;
   return weights.distance_weight * candidate.route_length_m + weights.label_weight * label_cost +
-         weights.ring_weight * ring_m(candidate.cluster->mean_m);
+         weights.ring_weight * ring_m(candidate.cluster->mean_m) +
+         weights.yaw_weight * yaw_time_s(input, candidate);
 }
 
 // Half the edge of the ring around the box's middle that a place lies on, rings having the box's
@@ -89,17 +96,15 @@ double ExplorerCollector::ring_m(const Vector3d& position_m) const {
 
 double ExplorerCollector::explorer_cost(const StrategyInput& input,
                                         const Candidate& candidate) const {
-  return greedy_cost(candidate) +
+  return greedy_cost(input, candidate) +
          config_.explorer.direction_weight * turn_angle(input, candidate.viewpoint.position_m);
 }
 
 double ExplorerCollector::collector_cost(const StrategyInput& input,
                                          const Candidate& candidate) const {
   const double path_time_s = candidate.route_length_m / rates_.collector_speed_mps;
-  const double yaw_time_s =
-      std::abs(angle_difference(candidate.viewpoint.yaw_rad, input.vehicle.yaw_rad)) /
-      rates_.yaw_rate_radps;
-  return config_.collector.path_weight * path_time_s + config_.collector.yaw_weight * yaw_time_s +
+  return config_.collector.path_weight * path_time_s +
+         config_.collector.yaw_weight * yaw_time_s(input, candidate) +
          config_.collector.momentum_weight * momentum_time_s(input, candidate.viewpoint.position_m);
 }
 
@@ -139,7 +144,7 @@ std::optional<Candidate> ExplorerCollector::choose_as_explorer(const StrategyInp
       [&](const Candidate& candidate) {
         return distance_m(candidate) <= settings.greedy_distance_m;
       },
-      [&](const Candidate& candidate) { return kept(candidate, greedy_cost(candidate)); });
+      [&](const Candidate& candidate) { return kept(candidate, greedy_cost(input, candidate)); });
   if (near || !input.is_complete) {
     return near;
   }

@@ -43,6 +43,7 @@ struct ExplorerCostConfig {
   double label_weight = 1.0;
   double trail_penalty = 1.0;
   double ring_weight = 0.0;
+  double yaw_weight = 0.0;
   double ahead_distance_m = 6.0;
   double ahead_angle_rad = 0.6;
   double greedy_distance_m = 10.0;
@@ -61,6 +62,10 @@ struct ExplorerCostConfig {
             in_range(0.0, 1000.0),
             "per metre that the cluster's square ring lies further out in the box: from the inside "
             "outwards nothing is left behind; not in the paper");
+    f.field("yaw_weight",
+            yaw_weight,
+            in_range(0.0, 1000.0),
+            "per second of turning the camera, as a Collector pays it; not in the paper");
     f.field("ahead_distance_m",
             ahead_distance_m,
             in_range(0.5, 1000.0),
@@ -134,11 +139,12 @@ class ExplorerCollector final : public Strategy {
 
   [[nodiscard]] FlightMode select_mode(const StrategyInput& input) const;
   [[nodiscard]] double explorer_cost(const StrategyInput& input, const Candidate& candidate) const;
-  [[nodiscard]] double greedy_cost(const Candidate& candidate) const;
+  [[nodiscard]] double greedy_cost(const StrategyInput& input, const Candidate& candidate) const;
   [[nodiscard]] double collector_cost(const StrategyInput& input, const Candidate& candidate) const;
 
  private:
   [[nodiscard]] bool is_near_trail(const StrategyInput& input, const Candidate& candidate) const;
+  [[nodiscard]] double yaw_time_s(const StrategyInput& input, const Candidate& candidate) const;
   [[nodiscard]] double ring_m(const Vector3d& position_m) const;
   [[nodiscard]] double momentum_time_s(const StrategyInput& input,
                                        const Vector3d& position_m) const;
