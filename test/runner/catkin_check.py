@@ -3,12 +3,12 @@
 """The catkin builds: one workspace, and one package at a time with an install space."""
 
 import shutil
-import subprocess
 import time
 
 from builds import CCACHE
 from commands import JOBS, ROOT, run_logged, say, show_log
 from results import SuiteResult
+from short_flight import flies
 
 WORKSPACE = ROOT / "catkin_ws"
 LOGS = ROOT / "build-test" / "catkin"
@@ -17,35 +17,6 @@ OPTIONS = ["-DCMAKE_BUILD_TYPE=Release", "-DCATKIN_ENABLE_TESTING=OFF"]
 PROGRAM = "lib/understory_sim/understory_simulate"
 
 
-# Two seconds of a flight: enough to need the libraries, the configuration and the report.
-SCENARIO = """scene: {name: catkin, box: {x_min_m: -3.0, y_min_m: -3.0, x_max_m: 3.0, y_max_m: 3.0}}
-mission: {time_limit_s: 2.0}
-"""
-
-
-def _flies(program, folder):
-    """Whether a program flies and reports, without any variable set for it."""
-    scenario = folder / "scenario.yaml"
-    results = folder / "results"
-    shutil.rmtree(results, ignore_errors=True)
-    folder.mkdir(parents=True, exist_ok=True)
-    scenario.write_text(SCENARIO, encoding="utf-8")
-    outcome = subprocess.run(
-        [program, "--scenario", scenario, "--out", results, "--quiet"],
-        cwd="/",
-        env={"PATH": "/usr/bin:/bin", "HOME": str(folder)},
-        stdin=subprocess.DEVNULL,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        encoding="utf-8",
-        timeout=300,
-        check=False,
-    )
-    written = [(results / name).exists() for name in ("result.json", "report.html")]
-    if not all(written):
-        say(outcome.stdout)
-    return all(written)
-
 
 def _build(result, name, command, space):
     log = LOGS / f"{name}.log"
@@ -53,7 +24,7 @@ def _build(result, name, command, space):
     if run_logged(command + OPTIONS, log, env=CCACHE, cwd=WORKSPACE) != 0:
         show_log(log)
         result.failed.append(f"{name} failed")
-    elif not (space / PROGRAM).exists() or not _flies(space / PROGRAM, LOGS / name):
+    elif not (space / PROGRAM).exists() or not flies(space / PROGRAM, LOGS / name, 2.0):
         result.failed.append(f"{name}: {space / PROGRAM} does not fly")
     else:
         result.passed += 1

@@ -17,6 +17,7 @@ from catkin_check import check_catkin
 from commands import ROOT, cpp_files, say
 from python_tests import run_python_tests
 from results import SuiteResult, check_minimums, read_minimums, summary, totals
+from short_flight import flies
 from static_checks import check_format, check_shell
 from tidy import check_tidy
 
@@ -71,13 +72,21 @@ def check_parameters(folder):
 
 
 def run_sanitized():
-    say("\n== asan: unit and bad-input tests under address and undefined-behaviour sanitizers")
+    say("\n== asan: unit and bad-input tests, a flight under address and undefined-behaviour sanitizers")
     options = builds.SANITIZED + ["-DUNDERSTORY_SANITIZE=address,undefined"]
     began = time.monotonic()
     folder = builds.build("build-asan-test", options, ["understory_sanitized_tests"])
     if folder is None:
         return [SuiteResult("unit-asan", failed=["build-asan-test does not compile"])]
     results = builds.run_ctest(folder, "^(unit|bad_input)$", "-asan", SANITIZER_ENV)
+    say("  a short flight")
+    flight = SuiteResult("flight-asan")
+    program = folder / "src/understory_sim/understory_simulate"
+    if flies(program, folder / "short_flight", 10.0, SANITIZER_ENV):
+        flight.passed = 1
+    else:
+        flight.failed.append("a flight of 10 s, see above")
+    results.append(flight)
     say(f"  {time.monotonic() - began:.0f} s in all")
     return results
 
