@@ -210,8 +210,8 @@ TEST(FrontierFinder, ClusterCountsAsSeenAfterAFifthOfItIsGone) {
 MapSnapshotPtr room_with_pillar(SnapshotBuilder& builder, double angle_rad) {
   builder.fill(VoxelState::kFree);
   const Vector2d along(std::cos(angle_rad), std::sin(angle_rad));
-  for (double s = -0.6; s <= 0.6; s += 0.05) {
-    builder.set_cylinder(s * along, 0.15, VoxelState::kUnknown);
+  for (int step = -12; step <= 12; ++step) {
+    builder.set_cylinder(0.05 * step * along, 0.15, VoxelState::kUnknown);
   }
   return builder.build();
 }

@@ -79,7 +79,8 @@ TEST(RouteSearch, LengthIsAtMostEightPercentAboveTheStraightLineInTheOpen) {
   map.update(builder.fill(VoxelState::kFree).build());
   RouteSearch routes(builder.geometry(), kClearanceM);
   std::vector<RouteLattice::Node> targets;
-  for (double angle_rad = 0.0; angle_rad < 6.28; angle_rad += 0.1) {
+  for (int step = 0; step < 63; ++step) {
+    const double angle_rad = 0.1 * step;
     targets.push_back(
         routes.lattice().nearest({5.0 * std::cos(angle_rad), 5.0 * std::sin(angle_rad), 0.95}));
   }
