@@ -15,7 +15,8 @@ std::string config_folder() {
 }
 
 TEST(SimulationConfig, EveryMisspeltKeyIsAnErrorThatNamesIt) {
-  const std::string good = to_yaml(SimulationConfig{});
+  const SimulationConfig defaults;
+  const std::string good = to_yaml(defaults);
   const std::regex key(R"(([a-z0-9_]+):)");
   int keys = 0;
   for (auto match = std::sregex_iterator(good.begin(), good.end(), key);

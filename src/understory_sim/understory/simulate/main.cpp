@@ -13,9 +13,9 @@
 #include <unistd.h>
 
 #include "understory/map/octomap_io.hpp"
+#include "understory/sim/mission_run.hpp"
 #include "understory/simulate/batch.hpp"
 #include "understory/simulate/live_line.hpp"
-#include "understory/sim/mission_run.hpp"
 #include "understory/simulate/options.hpp"
 
 namespace understory {
