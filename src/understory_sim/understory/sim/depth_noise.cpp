@@ -9,7 +9,7 @@
 namespace understory {
 namespace {
 
-constexpr double kNearest_m = 0.01;
+constexpr double kNearestM = 0.01;
 
 }  // namespace
 
@@ -25,7 +25,7 @@ DepthImage add_noise(DepthImage image, const DepthNoiseConfig& config, Rng& rng)
     } else if (blurs && std::isfinite(z_m)) {
       const double true_m = static_cast<double>(z_m);
       const double noisy_m = true_m + config.deviation_at_1m_m * true_m * true_m * rng.normal();
-      z_m = static_cast<float>(std::max(noisy_m, kNearest_m));
+      z_m = static_cast<float>(std::max(noisy_m, kNearestM));
     }
   }
   return image;

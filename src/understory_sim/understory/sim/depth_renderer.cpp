@@ -16,11 +16,11 @@
 namespace understory {
 namespace {
 
-constexpr double kGround_m = -0.001;
+constexpr double kGroundM = -0.001;
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
 
 // Packets of 4 x 4 neighbouring pixels, for Embree's widest kernel and coherent traversal.
-constexpr int kTile_px = 4;
+constexpr int kTilePx = 4;
 constexpr std::size_t kLanes = 16;
 using Lanes = std::array<float, kLanes>;
 
@@ -53,10 +53,10 @@ struct PixelDirections {
   std::vector<float> y_of_row;
 
   explicit PixelDirections(const CameraModel& camera) {
-    for (int u = 0; u < camera.width_px + kTile_px; ++u) {
+    for (int u = 0; u < camera.width_px + kTilePx; ++u) {
       x_of_column.push_back(static_cast<float>((u - camera.cx) / camera.fx));
     }
-    for (int v = 0; v < camera.height_px + kTile_px; ++v) {
+    for (int v = 0; v < camera.height_px + kTilePx; ++v) {
       y_of_row.push_back(static_cast<float>((v - camera.cy) / camera.fy));
     }
   }
@@ -71,8 +71,8 @@ struct Tile {
 Tile tile_at(const PixelDirections& directions, int u0, int v0) {
   Tile tile;
   for (std::size_t lane = 0; lane < kLanes; ++lane) {
-    tile.x[lane] = directions.x_of_column[static_cast<std::size_t>(u0) + lane % kTile_px];
-    tile.y[lane] = directions.y_of_row[static_cast<std::size_t>(v0) + lane / kTile_px];
+    tile.x[lane] = directions.x_of_column[static_cast<std::size_t>(u0) + lane % kTilePx];
+    tile.y[lane] = directions.y_of_row[static_cast<std::size_t>(v0) + lane / kTilePx];
   }
   return tile;
 }
@@ -101,23 +101,24 @@ void prepare(const View& view, Tile& tile, RTCRayHit16& packet) {
 // Lanes of a tile that lie within the image.
 void mark_valid(const CameraModel& camera, int u0, int v0, std::array<int, kLanes>& valid) {
   for (std::size_t lane = 0; lane < kLanes; ++lane) {
-    const bool inside = u0 + static_cast<int>(lane) % kTile_px < camera.width_px &&
-                        v0 + static_cast<int>(lane) / kTile_px < camera.height_px;
+    const bool inside = u0 + static_cast<int>(lane) % kTilePx < camera.width_px &&
+                        v0 + static_cast<int>(lane) / kTilePx < camera.height_px;
     valid[lane] = inside ? -1 : 0;
   }
 }
 
 void store(const RTCRayHit16& packet, const Tile& tile, int u0, int v0, DepthImage& image) {
-  const int columns = std::min(kTile_px, image.width_px - u0);
-  const int rows = std::min(kTile_px, image.height_px - v0);
-  for (int row = 0; row < rows; ++row) {
-    float* out = image.z_m.data() +
-                 static_cast<std::size_t>(v0 + row) * static_cast<std::size_t>(image.width_px) +
-                 static_cast<std::size_t>(u0);
-    for (int column = 0; column < columns; ++column) {
-      const auto lane = static_cast<std::size_t>(row * kTile_px + column);
-      out[column] = packet.hit.geomID[lane] != RTC_INVALID_GEOMETRY_ID ? packet.ray.tfar[lane]
-                                                                       : tile.no_hit_z_m[lane];
+  const auto columns = static_cast<std::size_t>(std::min(kTilePx, image.width_px - u0));
+  const auto rows = static_cast<std::size_t>(std::min(kTilePx, image.height_px - v0));
+  const auto width = static_cast<std::size_t>(image.width_px);
+  float* out =
+      image.z_m.data() + static_cast<std::size_t>(v0) * width + static_cast<std::size_t>(u0);
+  for (std::size_t row = 0; row < rows; ++row) {
+    for (std::size_t column = 0; column < columns; ++column) {
+      const std::size_t lane = row * kTilePx + column;
+      out[row * width + column] = packet.hit.geomID[lane] != RTC_INVALID_GEOMETRY_ID
+                                      ? packet.ray.tfar[lane]
+                                      : tile.no_hit_z_m[lane];
     }
   }
 }
@@ -138,7 +139,7 @@ DepthImage DepthRenderer::render(const CameraModel& camera,
   image.height_px = camera.height_px;
   image.z_m.resize(static_cast<std::size_t>(camera.width_px) *
                    static_cast<std::size_t>(camera.height_px));
-  const double height_m = world_from_optical.translation().z() - kGround_m;
+  const double height_m = world_from_optical.translation().z() - kGroundM;
   if (height_m <= 0.0) {
     std::fill(image.z_m.begin(), image.z_m.end(), std::numeric_limits<float>::quiet_NaN());
     return image;
@@ -150,14 +151,14 @@ DepthImage DepthRenderer::render(const CameraModel& camera,
                   scene_->to_scene(world_from_optical.translation()),
                   static_cast<float>(height_m),
                   static_cast<float>(camera.max_range_m)};
-  RTCIntersectContext context;
+  RTCIntersectContext context{};
   rtcInitIntersectContext(&context);
   context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
   alignas(64) RTCRayHit16 packet{};
   std::fill(std::begin(packet.ray.mask), std::end(packet.ray.mask), ~0U);
   alignas(64) std::array<int, kLanes> valid{};
-  for (int v = 0; v < camera.height_px; v += kTile_px) {
-    for (int u = 0; u < camera.width_px; u += kTile_px) {
+  for (int v = 0; v < camera.height_px; v += kTilePx) {
+    for (int u = 0; u < camera.width_px; u += kTilePx) {
       Tile tile = tile_at(directions, u, v);
       prepare(view, tile, packet);
       mark_valid(camera, u, v, valid);

@@ -11,8 +11,8 @@
 namespace understory {
 namespace {
 
-constexpr double kLargestGap_m = 0.0015;      // between the prism's faces and the true cylinder
-constexpr double kBelowGround_m = 0.1;        // trunks reach into the ground
+constexpr double kLargestGapM = 0.0015;       // between the prism's faces and the true cylinder
+constexpr double kBelowGroundM = 0.1;         // trunks reach into the ground
 constexpr const char* kDevice = "threads=1";  // building must not start a pool of threads
 
 struct Quad {
@@ -30,7 +30,7 @@ void append_prism(const Trunk& trunk,
     const double angle_rad = 2.0 * kPi * i / sides;
     const Vector2d rim =
         trunk.center_m + trunk.radius_m * Vector2d(std::cos(angle_rad), std::sin(angle_rad));
-    for (const double z_m : {-kBelowGround_m, top_m}) {
+    for (const double z_m : {-kBelowGroundM, top_m}) {
       vertices.emplace_back((Vector3d(rim.x(), rim.y(), z_m) - origin_m).cast<float>());
     }
   }
@@ -60,7 +60,7 @@ Box2d extent_of(const Forest& forest) {
 }  // namespace
 
 int prism_sides(double radius_m) {
-  const double cosine = 1.0 - kLargestGap_m / radius_m;
+  const double cosine = 1.0 - kLargestGapM / radius_m;
   const double sides = cosine > 0.8 ? std::ceil(kPi / std::acos(cosine)) : 5.0;
   return 2 * static_cast<int>(std::ceil(0.5 * sides));
 }
@@ -174,7 +174,7 @@ bool EmbreeScene::blocks(const Vector3d& from_world, const Vector3d& to_world) c
   ray.dir_z = direction.z();
   ray.tfar = 1.0F;
   ray.mask = ~0U;
-  RTCIntersectContext context;
+  RTCIntersectContext context{};
   rtcInitIntersectContext(&context);
   rtcOccluded1(scene_, &context, &ray);
   return ray.tfar < 0.0F;  // Embree's mark of an occluded ray

@@ -12,7 +12,7 @@ namespace understory {
 namespace {
 
 // Candidates are constructed this much farther out, so that rounding cannot cost the clearance.
-constexpr double kSlack_m = 1e-6;
+constexpr double kSlackM = 1e-6;
 
 bool touches(const TriangleMesh& mesh,
              const std::array<std::uint32_t, 3>& triangle,
@@ -73,7 +73,7 @@ std::vector<Vector2d> candidates(const std::vector<Trunk>& trunks,
   std::vector<Keepout> keepouts;
   std::vector<Trunk> grown;
   for (const Trunk& trunk : trunks) {
-    keepouts.push_back({trunk.center_m, trunk.radius_m + clearance_m + kSlack_m});
+    keepouts.push_back({trunk.center_m, trunk.radius_m + clearance_m + kSlackM});
     grown.push_back({trunk.center_m, keepouts.back().radius_m});
   }
   std::vector<Vector2d> points;

@@ -19,9 +19,9 @@
 namespace understory {
 namespace {
 
-constexpr double kLargestRadius_m = 5.0;
-constexpr double kLargestCoordinate_m = 1e5;
-constexpr std::uintmax_t kLargestFile_bytes = 256U << 20U;
+constexpr double kLargestRadiusM = 5.0;
+constexpr double kLargestCoordinateM = 1e5;
+constexpr std::uintmax_t kLargestFileBytes = 256U << 20U;
 constexpr const char* kDiameterHeader = "x_m,y_m,dbh_m";
 
 using CsvReader = io::CSVReader<3,
@@ -44,7 +44,7 @@ std::string text_of_file(const std::string& path) {
     fail(path, "is a folder, not a CSV file");
   }
   const std::uintmax_t size = std::filesystem::file_size(path, error);
-  if (!error && size > kLargestFile_bytes) {
+  if (!error && size > kLargestFileBytes) {
     fail(path, "larger than 256 MiB, not a stem map");
   }
   std::ifstream file(path, std::ios::binary);
@@ -78,13 +78,13 @@ double number(const std::string& path, unsigned line, const char* name, const ch
 }
 
 Trunk checked_trunk(const std::string& path, unsigned line, const Trunk& trunk) {
-  if (trunk.center_m.cwiseAbs().maxCoeff() > kLargestCoordinate_m) {
+  if (trunk.center_m.cwiseAbs().maxCoeff() > kLargestCoordinateM) {
     fail(path, line, "farther than 100 km from the origin");
   }
   if (!(trunk.radius_m > 0.0)) {
     fail(path, line, "the trunk's size is not positive");
   }
-  if (trunk.radius_m > kLargestRadius_m) {
+  if (trunk.radius_m > kLargestRadiusM) {
     fail(path, line, "the trunk's radius is above 5 m");
   }
   return trunk;

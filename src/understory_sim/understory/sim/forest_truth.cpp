@@ -84,7 +84,7 @@ double mesh_distance_m(const EmbreeScene& scene,
   query.y = p_scene.y();
   query.z = p_scene.z();
   query.radius = static_cast<float>(max_m);
-  RTCPointQueryContext context;
+  RTCPointQueryContext context{};
   rtcInitPointQueryContext(&context);
   rtcPointQuery(scene.handle(), &query, &context, visit_triangle, &search);
   return search.best_m;

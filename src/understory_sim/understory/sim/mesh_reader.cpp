@@ -17,7 +17,7 @@
 namespace understory {
 namespace {
 
-constexpr float kLargestCoordinate_m = 1e5F;
+constexpr float kLargestCoordinateM = 1e5F;
 
 [[noreturn]] void fail(const std::string& path, const std::string& reason) {
   throw ForestError(path + ": " + reason);
@@ -80,7 +80,7 @@ void check(const TriangleMesh& mesh, const std::string& path) {
     if (!vertex.allFinite()) {
       fail(path, "has a vertex that is not finite");
     }
-    if (vertex.cwiseAbs().maxCoeff() > kLargestCoordinate_m) {
+    if (vertex.cwiseAbs().maxCoeff() > kLargestCoordinateM) {
       fail(path, "has a vertex farther than 100 km from the origin");
     }
   }

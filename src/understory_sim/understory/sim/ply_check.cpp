@@ -133,30 +133,37 @@ std::uint64_t list_length(const std::string& content,
   return length;
 }
 
+// Where the property's value ends that begins here; past the end when the file is too short.
+std::size_t end_of_value(const std::string& content,
+                         std::size_t at,
+                         const Property& property,
+                         bool big_endian) {
+  const std::size_t past_end = content.size() + 1;
+  if (at > content.size() || property.count_bytes > content.size() - at) {
+    return past_end;
+  }
+  const std::uint64_t values =
+      property.count_bytes == 0 ? 1 : list_length(content, at, property.count_bytes, big_endian);
+  const std::size_t first = at + property.count_bytes;
+  const bool fits = values <= (content.size() - first) / property.value_bytes;
+  return fits ? first + values * property.value_bytes : past_end;
+}
+
 bool has_all_bytes(const std::string& content, const Header& header) {
   const bool big_endian = header.format == "binary_big_endian";
   std::size_t at = header.body;
   for (const Element& element : header.elements) {
+    // Every row takes a byte at least, so this bounds the work too.
     if (element.count > content.size() || (element.count > 0 && element.properties.empty())) {
       return false;
     }
-    for (std::uint64_t row = 0; row < element.count; ++row) {
+    for (std::uint64_t row = 0; row < element.count && at <= content.size(); ++row) {
       for (const Property& property : element.properties) {
-        if (content.size() - at < std::max(property.count_bytes, std::size_t{1})) {
-          return false;
-        }
-        const std::uint64_t values =
-            property.count_bytes == 0 ? 1
-                                      : list_length(content, at, property.count_bytes, big_endian);
-        at += property.count_bytes;
-        if (values > (content.size() - at) / property.value_bytes) {
-          return false;
-        }
-        at += values * property.value_bytes;
+        at = end_of_value(content, at, property, big_endian);
       }
     }
   }
-  return true;
+  return at <= content.size();
 }
 
 }  // namespace

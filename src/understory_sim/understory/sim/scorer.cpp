@@ -11,9 +11,9 @@
 namespace understory {
 namespace {
 
-constexpr double kClearanceHorizon_m = 10.0;
-constexpr double kContactRelease_m = 0.01;  // a contact has ended this far out: jitter is no second
-constexpr double kVolumePeriod_s = 60.0;
+constexpr double kClearanceHorizonM = 10.0;
+constexpr double kContactReleaseM = 0.01;  // a contact has ended this far out: jitter is no second
+constexpr double kVolumePeriodS = 60.0;
 
 // Rows of this tile lie inside the box within these bounds.
 std::uint16_t column_mask(const VoxelBox& inside) {
@@ -45,7 +45,7 @@ Scorer::Scorer(std::shared_ptr<const ForestTruth> forest,
       vehicle_radius_m_(vehicle_radius_m),
       start_(start),
       tiles_(truth_->geometry().slot_count()),
-      min_clearance_m_(kClearanceHorizon_m) {}
+      min_clearance_m_(kClearanceHorizonM) {}
 
 void Scorer::on_map(const MapSnapshot& map) {
   assert(map.geometry == truth_->geometry());
@@ -108,7 +108,7 @@ void Scorer::record_coverage_times(double time_s) {
 
 void Scorer::record_volumes_before(double time_s) {
   const auto next_s = [&] {
-    return kVolumePeriod_s * static_cast<double>(score_.volume_over_time.size() + 1);
+    return kVolumePeriodS * static_cast<double>(score_.volume_over_time.size() + 1);
   };
   while (next_s() < time_s) {
     score_.volume_over_time.push_back({next_s(), explored_volume_m3()});
@@ -138,13 +138,13 @@ void Scorer::on_vehicle(Time time, const VehicleState& state) {
 
 void Scorer::judge_clearance(const Vector3d& position_m) {
   // Nothing farther away than this can change the verdict, and a short search is a quick one.
-  const double enough_m = std::max(min_clearance_m_, vehicle_radius_m_ + kContactRelease_m);
+  const double enough_m = std::max(min_clearance_m_, vehicle_radius_m_ + kContactReleaseM);
   const double clearance_m = forest_->distance_to_nearest_surface_m(position_m, enough_m);
   min_clearance_m_ = std::min(min_clearance_m_, clearance_m);
   if (!in_contact_ && clearance_m < vehicle_radius_m_) {
     in_contact_ = true;
     ++score_.collisions;
-  } else if (clearance_m >= vehicle_radius_m_ + kContactRelease_m) {
+  } else if (clearance_m >= vehicle_radius_m_ + kContactReleaseM) {
     in_contact_ = false;
   }
 }
@@ -168,10 +168,10 @@ Score Scorer::score() const {
         squared_speed_integral_ / flown_s_ - score.speed_mean_mps * score.speed_mean_mps;
     score.speed_std_mps = std::sqrt(std::max(0.0, variance));
   }
-  if (min_clearance_m_ < kClearanceHorizon_m) {
+  if (min_clearance_m_ < kClearanceHorizonM) {
     score.min_clearance_m = min_clearance_m_;
   }
-  const double next_s = kVolumePeriod_s * static_cast<double>(score.volume_over_time.size() + 1);
+  const double next_s = kVolumePeriodS * static_cast<double>(score.volume_over_time.size() + 1);
   if (next_s <= latest_s_) {  // the period ends with the mission
     score.volume_over_time.push_back({next_s, score.explored_volume_m3});
   }

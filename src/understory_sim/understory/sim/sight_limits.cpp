@@ -9,10 +9,10 @@
 namespace understory {
 namespace {
 
-constexpr double kSteepest_rad = 1.5;
+constexpr double kSteepestRad = 1.5;
 
 double slope_of(double elevation_rad) {
-  return std::tan(std::clamp(elevation_rad, -kSteepest_rad, kSteepest_rad));
+  return std::tan(std::clamp(elevation_rad, -kSteepestRad, kSteepestRad));
 }
 
 }  // namespace

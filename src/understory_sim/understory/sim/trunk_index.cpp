@@ -8,7 +8,7 @@
 namespace understory {
 namespace {
 
-constexpr double kFinestCell_m = 1.0;
+constexpr double kFinestCellM = 1.0;
 constexpr double kCellsPerTrunk = 8.0;
 constexpr double kCellsAtLeast = 4096.0;
 
@@ -31,7 +31,7 @@ TrunkIndex::TrunkIndex(const std::vector<Trunk>& trunks) {
   // A stray trunk far away makes cells coarser instead of the table huge.
   const double most_cells =
       std::max(kCellsAtLeast, kCellsPerTrunk * static_cast<double>(trunks.size()));
-  cell_m_ = std::max(kFinestCell_m, std::sqrt(extent.volume() / most_cells));
+  cell_m_ = std::max(kFinestCellM, std::sqrt(extent.volume() / most_cells));
   cell_m_ = std::max(cell_m_, extent.sizes().maxCoeff() / most_cells);
   origin_m_ = extent.min();
   count_x_ = static_cast<int>(extent.sizes().x() / cell_m_) + 1;
