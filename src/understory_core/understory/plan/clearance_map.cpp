@@ -113,7 +113,7 @@ FreeBlock free_block_around(const MapSnapshot& snapshot, const Vector3i& tile) {
         for (int z = along_z.begin; z < along_z.end; ++z) {
           for (int y = along_y.begin; y < along_y.end; ++y) {
             const unsigned bits = rows.row(y - along_y.tile_shift, z - along_z.tile_shift);
-            block[static_cast<std::size_t>(z * kBlockVoxels + y)] |=
+            block[static_cast<std::size_t>(z) * kBlockVoxels + static_cast<std::size_t>(y)] |=
                 shift >= 0 ? bits << static_cast<unsigned>(shift)
                            : bits >> static_cast<unsigned>(-shift);
           }
@@ -246,8 +246,8 @@ DistanceAndGradient ClearanceMap::distance_and_gradient(const Vector3d& point_m)
   const Cell cell = cell_at(point_m);
   const std::array<float, 8>& d = cell.distance_voxels;
   const Vector3d& f = cell.fraction;
-  std::array<double, 4> along_x;
-  std::array<double, 4> slope_x;
+  std::array<double, 4> along_x{};
+  std::array<double, 4> slope_x{};
   for (std::size_t i = 0; i < 4; ++i) {
     slope_x[i] = static_cast<double>(d[2 * i + 1] - d[2 * i]);
     along_x[i] = static_cast<double>(d[2 * i]) + slope_x[i] * f.x();

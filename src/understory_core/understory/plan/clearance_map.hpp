@@ -59,8 +59,8 @@ class ClearanceMap {
 
   // The eight voxel centres around a point and where the point lies between them.
   struct Cell {
-    std::array<float, 8> distance_voxels;  // x fastest, then y, then z
-    Vector3d fraction;
+    std::array<float, 8> distance_voxels{};  // x fastest, then y, then z
+    Vector3d fraction = Vector3d::Zero();
   };
 
   void mark_stale(TileSlot slot, const VoxelBox& changed_in_tile);

@@ -71,14 +71,17 @@ void lower_envelope(const std::uint8_t* in, std::size_t stride, std::uint8_t* __
 }  // namespace
 
 std::array<std::uint8_t, kVoxelsPerTile> squared_distances(const FreeBlock& block) {
+  // NOLINTNEXTLINE(cppcoreguidelines-pro-type-member-init): written in full before it is read
   std::array<std::uint8_t, kBlock * kRow> plane;  // one z: 32 rows in y
-  std::array<std::uint8_t, kBlock * kPlane> xy;   // z from -8 to 23
+  // NOLINTNEXTLINE(cppcoreguidelines-pro-type-member-init): written in full before it is read
+  std::array<std::uint8_t, kBlock * kPlane> xy;  // z from -8 to 23
   for (std::size_t z = 1; z < kBlock; ++z) {
     for (std::size_t y = 1; y < kBlock; ++y) {
       distances_along_x(block[z * kBlock + y], &plane[y * kRow]);
     }
     lower_envelope(&plane[kHalo * kRow], kRow, &xy[z * kPlane]);
   }
+  // NOLINTNEXTLINE(cppcoreguidelines-pro-type-member-init): written in full before it is read
   std::array<std::uint8_t, kVoxelsPerTile> out;
   for (std::size_t z = 0; z < kRow; ++z) {
     lower_envelope(&xy[(z + kHalo) * kPlane], kPlane, &out[z * kPlane]);

@@ -20,7 +20,7 @@ inline constexpr int kBlockVoxels = kTileVoxels + 2 * kHaloVoxels;
 inline constexpr int kSaturatedSquare = kHaloVoxels * kHaloVoxels;
 
 // Bit x of row [z * kBlockVoxels + y] is set where the voxel (x, y, z) of the block is free.
-using FreeBlock = std::array<std::uint32_t, kBlockVoxels * kBlockVoxels>;
+using FreeBlock = std::array<std::uint32_t, std::size_t{kBlockVoxels} * std::size_t{kBlockVoxels}>;
 
 // In the order of offset_in_tile.
 [[nodiscard]] std::array<std::uint8_t, kVoxelsPerTile> squared_distances(const FreeBlock& block);

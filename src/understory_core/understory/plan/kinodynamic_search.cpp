@@ -21,7 +21,7 @@ constexpr int kMaxExpansions = 400;
 constexpr double kMergeDistance_m = 0.15;
 constexpr double kMergeSpeed_mps = 0.35;
 // How long a detour off the guide, or a wrong velocity, takes to make good; guidance, not a bound.
-constexpr double kOffsetCost_s_per_m = 0.5;
+constexpr double kOffsetCostSecondsPerMetre = 0.5;
 constexpr double kMismatchCost = 0.4;  // of the time that the change of velocity takes
 
 struct Node {
@@ -96,7 +96,7 @@ class KinodynamicSearch {
   [[nodiscard]] double guessed_rest_s(const Node& node) const {
     const double offset_m = (node.position_m - guide_.point_at(node.along_m)).norm();
     const double mismatch_mps = (node.velocity_mps - guide_velocity(node.along_m)).norm();
-    return guide_.time_to_go_s(node.along_m) + kOffsetCost_s_per_m * offset_m +
+    return guide_.time_to_go_s(node.along_m) + kOffsetCostSecondsPerMetre * offset_m +
            kMismatchCost * mismatch_mps / limits_.acceleration_mps2;
   }
 

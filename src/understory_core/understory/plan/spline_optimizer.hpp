@@ -15,8 +15,8 @@ namespace understory {
 struct SplineTask {
   CubicBSpline<Vector3d>::Sample start;  // kept exactly
   Limits limits;                         // aimed at; leave some room to the real ones
-  double least_clearance_m;
-  double preferred_clearance_m;
+  double least_clearance_m = 0.0;
+  double preferred_clearance_m = 0.0;
 };
 
 struct OptimizerEffort {

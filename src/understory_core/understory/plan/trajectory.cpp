@@ -21,7 +21,7 @@ typename CubicBSpline<Point>::Sample CubicBSpline<Point>::sample(double time_s) 
   const Point first0 = q[1] - q[0];
   const Point first1 = q[2] - q[1];
   const Point first2 = q[3] - q[2];
-  Sample sample;
+  Sample sample{};
   sample.value = (w * w * w * q[0] + (3.0 * u * u * u - 6.0 * u * u + 4.0) * q[1] +
                   (3.0 * w * w * w - 6.0 * w * w + 4.0) * q[2] + u * u * u * q[3]) /
                  6.0;
