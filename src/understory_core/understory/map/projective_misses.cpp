@@ -165,6 +165,7 @@ class FrustumMarker {
       const float x = x0 + step;
       block_u[lane] = static_cast<int>(smaller(larger(u, 0.0F), u_limit));
       block_v[lane] = static_cast<int>(smaller(larger(v, 0.0F), v_limit));
+      // NOLINTNEXTLINE(cppcoreguidelines-narrowing-conversions): a float constant stays a float
       depth[lane] = x * x + yz_squared <= range_squared ? z : kBeyondEverything;
     }
     std::uint32_t bits = 0;
