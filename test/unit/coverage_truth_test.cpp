@@ -16,7 +16,12 @@ namespace {
 
 constexpr double kVehicleRadius_m = 0.20;
 
-Box3d box(double x0, double y0, double z0, double x1, double y1, double z1) {
+Box3d box(double x0,
+          double y0,
+          double z0,
+          double x1,
+          double y1,
+          double z1) {  // NOLINT(readability-function-size)
   return {Vector3d(x0, y0, z0), Vector3d(x1, y1, z1)};
 }
 
@@ -83,7 +88,8 @@ class BruteForce {
                                   const Vector3d& target,
                                   double slack) const {
     const double flat_m = (target.head<2>() - place).norm();
-    for (double z_m = kVehicleRadius_m; z_m <= geometry_.box_m().max().z() + 1e-9; z_m += 0.01) {
+    for (double z_m = kVehicleRadius_m; z_m <= geometry_.box_m().max().z() + 1e-9;
+         z_m += 0.01) {  // NOLINT(cert-flp30-c): a coarse scan
       const double rise_m = target.z() - z_m;
       if (std::abs(std::atan2(rise_m, flat_m)) <= 0.5 * camera_.vertical_fov_rad + slack &&
           std::hypot(flat_m, rise_m) <= camera_.max_range_m + slack) {
