@@ -107,8 +107,8 @@ class SlowReference {
   [[nodiscard]] Verdict& verdict_of(const VoxelIndex& voxel) {
     const Vector3i size = geometry_.voxels().size();
     const Vector3i local = voxel - geometry_.voxels().min;
-    return verdicts_[static_cast<std::size_t>((local.z() * size.y() + local.y()) * size.x() +
-                                              local.x())];
+    const int slot = (local.z() * size.y() + local.y()) * size.x() + local.x();
+    return verdicts_[static_cast<std::size_t>(slot)];
   }
 
  private:

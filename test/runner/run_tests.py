@@ -6,6 +6,7 @@ Called by `understory test` once all packages are installed.
 """
 
 import argparse
+import pathlib
 import re
 import subprocess
 import sys
@@ -22,8 +23,10 @@ from static_checks import check_format, check_shell
 from tidy import check_tidy
 
 QUICK_SUITES = ["format", "shell", "unit", "python"]
+LEAKS_OF_LIBRARIES = pathlib.Path(__file__).parent / "lsan_suppressions.txt"
 SANITIZER_ENV = {
     "ASAN_OPTIONS": "strict_string_checks=1:detect_stack_use_after_return=1",
+    "LSAN_OPTIONS": f"suppressions={LEAKS_OF_LIBRARIES}:print_suppressions=0",
     "UBSAN_OPTIONS": "print_stacktrace=1",
 }
 THREADS = re.compile(r"^\s*#include <(thread|future|mutex|atomic|condition_variable|pthread\.h)>", re.M)

@@ -59,9 +59,8 @@ class LatticeSearch {
   }
   [[nodiscard]] std::size_t slot_of(const Vector3i& lattice) const {
     const Vector3i local = lattice - first_;
-    return static_cast<std::size_t>(
-        (local.z() * size_.y() + local.y()) * size_.x() +
-        local.x());  // NOLINT(bugprone-misplaced-widening-cast): small numbers
+    const int slot = (local.z() * size_.y() + local.y()) * size_.x() + local.x();
+    return static_cast<std::size_t>(slot);
   }
   [[nodiscard]] Vector3i lattice_of(std::size_t slot) const {
     const int index = static_cast<int>(slot);

@@ -51,10 +51,9 @@ void expect_exact(const ClearanceMap& clearance, const MapSnapshot& map, Rng& rn
   for (int i = 0; i < 500; ++i) {
     VoxelIndex voxel;
     for (int axis = 0; axis < 3; ++axis) {
+      const int choices = box.size()[axis] + 4;
       voxel[axis] =
-          box.min[axis] - 2 +
-          static_cast<int>(rng.below(static_cast<std::uint64_t>(
-              box.size()[axis] + 4)));  // NOLINT(bugprone-misplaced-widening-cast): small numbers
+          box.min[axis] - 2 + static_cast<int>(rng.below(static_cast<std::uint64_t>(choices)));
     }
     ASSERT_EQ(clearance.squared_distance_voxels(voxel), brute_force_square(map, voxel))
         << voxel.transpose();

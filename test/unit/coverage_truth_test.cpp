@@ -16,12 +16,8 @@ namespace {
 
 constexpr double kVehicleRadius_m = 0.20;
 
-Box3d box(double x0,
-          double y0,
-          double z0,
-          double x1,
-          double y1,
-          double z1) {  // NOLINT(readability-function-size)
+// NOLINTNEXTLINE(readability-function-size): six bounds read best as six numbers
+Box3d box(double x0, double y0, double z0, double x1, double y1, double z1) {
   return {Vector3d(x0, y0, z0), Vector3d(x1, y1, z1)};
 }
 

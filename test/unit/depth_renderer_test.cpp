@@ -223,7 +223,8 @@ TEST(DepthRenderer, IgnoresAndKeepsTheCallersFloatingPointState) {
 }
 
 TEST(PrismSides, KeepTheFacesWithinTwoMillimetresOfTheCylinder) {
-  for (double radius_m = 0.005; radius_m <= 5.0; radius_m *= 1.3) {
+  for (int step = 0; step <= 26; ++step) {
+    const double radius_m = 0.005 * std::pow(1.3, step);
     const int sides = prism_sides(radius_m);
 
     EXPECT_LT(radius_m * (1.0 - std::cos(kPi / sides)), kTolerance_m) << radius_m;

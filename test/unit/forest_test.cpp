@@ -167,10 +167,11 @@ TEST(NearestClearPoint, IsClearAndNoFartherThanAnyPointOfAFineGrid) {
     const Vector2d near_m(near_x_m, rng.uniform(-9, 9));
 
     double best_m = 1e9;
-    for (double x_m = -7; x_m <= 7.0; x_m += 0.05) {
-      for (double y_m = -7; y_m <= 7.0; y_m += 0.05) {
-        if (brute_distance_m(forest, {x_m, y_m}, 9.0) >= 1.0) {
-          best_m = std::min(best_m, (Vector2d(x_m, y_m) - near_m).norm());
+    for (int column = -140; column <= 140; ++column) {
+      for (int row = -140; row <= 140; ++row) {
+        const Vector2d place_m = Vector2d(column, row) * 0.05;
+        if (brute_distance_m(forest, place_m, 9.0) >= 1.0) {
+          best_m = std::min(best_m, (place_m - near_m).norm());
         }
       }
     }

@@ -13,7 +13,7 @@
 namespace understory {
 namespace {
 
-constexpr std::size_t kPixels = 160U * 120U;
+constexpr std::size_t kPixels = std::size_t{160} * 120;
 constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
 Box3d room() {

@@ -28,7 +28,7 @@ VehicleState hover(const Vector3d& position_m) {
 }
 
 class ScorerTest : public testing::Test {
- protected:
+ public:
   ScorerTest() {
     Forest forest;
     forest.trunks = {{Vector2d(1.5, 0), 0.25}, {Vector2d(-1, 1), 0.15}};
