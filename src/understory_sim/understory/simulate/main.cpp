@@ -1,8 +1,8 @@
 // Copyright 2026 the Understory authors
 // SPDX-License-Identifier: BSD-3-Clause
 //
-// understory_simulate: flies one mission, or a batch of seeds, and writes what came of it. Exit
-// status: 0 completed without collision, 1 not so, 2 wrong use or configuration.
+// understory_simulate: flies one mission and writes what came of it. Exit status: 0 completed
+// without collision, 1 not so, 2 wrong use or configuration.
 #include <csignal>
 #include <cstdio>
 #include <cstdlib>
@@ -14,7 +14,6 @@
 
 #include "understory/map/octomap_io.hpp"
 #include "understory/sim/mission_run.hpp"
-#include "understory/simulate/batch.hpp"
 #include "understory/simulate/live_line.hpp"
 #include "understory/simulate/options.hpp"
 
@@ -143,10 +142,6 @@ int run_main(int argc, char** argv) {
     if (parsed.options->print_parameters) {
       print_parameters();
       return 0;
-    }
-    if (parsed.options->batch > 0) {
-      catch_signals();
-      return fly_batch(*parsed.options, [] { return g_interrupted != 0; });
     }
     return fly_one(*parsed.options);
   } catch (const std::exception& error) {

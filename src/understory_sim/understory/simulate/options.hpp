@@ -22,7 +22,6 @@ struct Options {
   std::string resume_file;
   std::string out_dir;
   std::uint64_t seed = 1;
-  int batch = 0;
   bool quiet = false;
   bool no_report = false;
   bool print_parameters = false;

@@ -1,0 +1,172 @@
+#!/usr/bin/python3
+# Copyright 2026 the Understory authors
+# SPDX-License-Identifier: BSD-3-Clause
+"""Flies all missions of a table over all cores and writes rows (CSV) and the table (Markdown).
+
+Exit status: 0 every mission completed without collision, 1 not so, 2 wrong use.
+"""
+
+import argparse
+import concurrent.futures
+import os
+import pathlib
+import re
+import shutil
+import subprocess
+import sys
+import threading
+import time
+
+from rows import append_row, is_good, markdown, read_rows, row_of
+from table_file import TableError, read_table
+
+ROOT = pathlib.Path(os.environ["UNDERSTORY_ROOT"])
+SIMULATOR = ROOT / "build/src/understory_sim/understory_simulate"
+
+
+def parse_arguments():
+    """The command line."""
+    parser = argparse.ArgumentParser(
+        prog="understory bench",
+        description="Flies all missions of a table over all cores. What is flown already is kept: "
+        "after an interrupt the same command goes on.",
+    )
+    parser.add_argument("--table", required=True, help="name in config/tables, or a YAML file")
+    parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1, help="missions at once")
+    parser.add_argument("--out", type=pathlib.Path, help="folder (default: results/bench/NAME)")
+    parser.add_argument("--fresh", action="store_true", help="fly all again")
+    parser.add_argument("--keep-folders", action="store_true", help="keep every result folder")
+    arguments = parser.parse_args()
+    if arguments.jobs < 1:
+        parser.error("--jobs: expected a number from 1")
+    return arguments
+
+
+def table_path(name):
+    """Of a table file, or of a name in config/tables."""
+    if "/" in name or name.endswith(".yaml"):
+        return pathlib.Path(name)
+    path = ROOT / "config" / "tables" / f"{name}.yaml"
+    if not path.exists():
+        names = sorted(found.stem for found in path.parent.glob("*.yaml"))
+        raise TableError(f"--table {name}: no such table; there are: {', '.join(names)}")
+    return path
+
+
+def commit():
+    """Of the project, with a + if files differ from it; unknown outside of a clone."""
+    done = subprocess.run(
+        ["git", "-C", str(ROOT), "describe", "--always", "--dirty=+", "--exclude=*"],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+        encoding="utf-8",
+        check=False,
+    )
+    return done.stdout.strip() or "unknown"
+
+
+class Bench:
+    """Missions in flight, and their rows."""
+
+    def __init__(self, folder, keep_folders):
+        self.folder = folder
+        self.csv = folder / "rows.csv"
+        self.keep_folders = keep_folders
+        self.commit = commit()
+        self.interrupted = threading.Event()
+
+    def fly(self, mission):
+        """The row of one mission; none if the bench was interrupted."""
+        if self.interrupted.is_set():
+            return None
+        out = self.folder / "missions" / mission.name
+        words = [str(SIMULATOR), "--scenario", mission.scenario, "--seed", str(mission.seed)]
+        words += ["--speed-cap", mission.speed_cap, "--out", str(out), "--quiet", "--no-report"]
+        if mission.forest:
+            words += ["--forest", mission.forest]
+        done = subprocess.run(
+            words, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, encoding="utf-8", check=False
+        )
+        said = done.stdout.strip().splitlines()
+        row = row_of(mission, out, said[0] if done.returncode == 2 and said else "", self.commit)
+        if row["stop_reason"] == "interrupted":
+            return None
+        if not self.keep_folders and is_good(row):
+            shutil.rmtree(out, ignore_errors=True)
+        return row
+
+    def fly_all(self, missions, jobs):
+        """Flies them and shows how far it is; every row is written as soon as it is there."""
+        began = time.monotonic()
+        good = 0
+        with concurrent.futures.ThreadPoolExecutor(jobs) as pool:
+            flights = [pool.submit(self.fly, mission) for mission in missions]
+            try:
+                for done, flight in enumerate(concurrent.futures.as_completed(flights), 1):
+                    row = flight.result()
+                    if row is None:
+                        continue
+                    append_row(self.csv, row)
+                    good += is_good(row)
+                    self.show(row, done, len(missions), good, time.monotonic() - began)
+            except KeyboardInterrupt:
+                self.interrupted.set()
+                print("\ninterrupted: waiting for the missions in flight", file=sys.stderr)
+        return not self.interrupted.is_set()
+
+    @staticmethod
+    def show(row, done, total, good, elapsed_s):
+        """One line of progress, in place on a terminal."""
+        left_min = elapsed_s / done * (total - done) / 60
+        text = (
+            f"{done} of {total} flown, {good} good, {left_min:.1f} minutes left; last: "
+            f"{row['scene']} {row['seed']} {row['speed_cap']}: "
+            f"{row['completion_time_s'] or row['stop_reason']}"
+        )
+        in_place = sys.stderr.isatty() and done < total
+        print(f"\r\033[K{text}" if sys.stderr.isatty() else text,
+              end="" if in_place else "\n", file=sys.stderr, flush=True)
+
+
+def group_title(row):
+    """Forests that differ in their seed only share a line: forest_d005_s1 is one of forest_d005."""
+    return re.sub(r"_s\d+$", "", row["scene"])
+
+
+def main():
+    """Returns the exit status."""
+    arguments = parse_arguments()
+    try:
+        path = table_path(arguments.table)
+        missions = read_table(path, ROOT)
+    except TableError as error:
+        print(f"understory bench: {error}", file=sys.stderr)
+        return 2
+    folder = arguments.out or pathlib.Path("results/bench") / path.stem
+    try:
+        if arguments.fresh:
+            shutil.rmtree(folder, ignore_errors=True)
+        (folder / "missions").mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        print(f"understory bench: {folder}: {error.strerror}", file=sys.stderr)
+        return 2
+    bench = Bench(folder, arguments.keep_folders)
+    flown = read_rows(bench.csv)
+    todo = [mission for mission in missions if mission.key not in flown]
+    if len(todo) < len(missions):
+        print(f"{len(missions) - len(todo)} of {len(missions)} are in {bench.csv} already "
+              "(--fresh flies them again)", file=sys.stderr)
+    finished = bench.fly_all(todo, arguments.jobs)
+    wanted = {mission.key for mission in missions}
+    rows = [row for key, row in sorted(read_rows(bench.csv).items()) if key in wanted]
+    table = markdown(rows, group_title)
+    (folder / "table.md").write_text(table, encoding="utf-8")
+    print(table, end="")
+    print(f"rows: {bench.csv.resolve()}\ntable: {(folder / 'table.md').resolve()}")
+    good = sum(is_good(row) for row in rows)
+    print(f"{good} of {len(missions)} completed without collision")
+    return 0 if finished and good == len(missions) else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())

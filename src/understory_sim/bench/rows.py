@@ -1,0 +1,106 @@
+# Copyright 2026 the Understory authors
+# SPDX-License-Identifier: BSD-3-Clause
+"""The rows of a table: one per mission flown, kept in a CSV file that grows with every mission."""
+
+import csv
+import json
+import statistics
+
+KEY = ["scene", "seed", "speed_cap"]
+MEASURED = [
+    "completed",
+    "stop_reason",
+    "completion_time_s",
+    "mission_time_s",
+    "coverage",
+    "t90_s",
+    "distance_m",
+    "speed_mean_mps",
+    "speed_max_mps",
+    "collisions",
+    "min_clearance_m",
+    "realtime_factor",
+    "peak_rss_mb",
+]
+DECISION = {"decision_p50_ms": "p50_ms", "decision_p99_ms": "p99_ms"}
+COLUMNS = KEY + ["commit", "error"] + MEASURED + list(DECISION)
+
+
+def row_of(mission, folder, error, commit):
+    """The row of a mission that was flown into this folder; `error` is what it said if it failed."""
+    row = dict(zip(KEY, mission.key), commit=commit, error=error)
+    try:
+        result = json.loads((folder / "result.json").read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        result = {"completed": False, "stop_reason": "no result"}
+    measured = {name: result.get(name) for name in MEASURED}
+    decision = result.get("stages", {}).get("decision", {})
+    measured.update((name, decision.get(key)) for name, key in DECISION.items())
+    row.update((name, "" if value is None else str(value)) for name, value in measured.items())
+    return row
+
+
+def read_rows(path):
+    """{key: row} of a file, empty if there is none. A last row cut short is left out."""
+    if not path.exists():
+        return {}
+    with path.open(encoding="utf-8", newline="") as lines:
+        rows = [row for row in csv.DictReader(lines) if None not in row.values()]
+    return {tuple(row[name] for name in KEY): row for row in rows}
+
+
+def append_row(path, row):
+    """Adds one row, with a header if it is the first."""
+    is_new = not path.exists()
+    with path.open("a", encoding="utf-8", newline="") as lines:
+        writer = csv.DictWriter(lines, COLUMNS, lineterminator="\n")
+        if is_new:
+            writer.writeheader()
+        writer.writerow(row)
+
+
+def is_good(row):
+    """Completed by itself, without touching anything."""
+    return row["completed"] == "True" and row["collisions"] == "0"
+
+
+def _mean(rows, name, digits):
+    values = [float(row[name]) for row in rows if row[name]]
+    if not values:
+        return "-"
+    spread = f" ± {statistics.stdev(values):.{digits}f}" if len(values) > 1 else ""
+    return f"{statistics.fmean(values):.{digits}f}{spread}"
+
+
+def _worst(rows, name, worst, digits):
+    values = [float(row[name]) for row in rows if row[name]]
+    return f"{worst(values):.{digits}f}" if values else "-"
+
+
+def markdown(rows, title_of):
+    """A table with one line per title and speed cap, in the order of first appearance."""
+    groups = {}
+    for row in rows:
+        groups.setdefault((title_of(row), row["speed_cap"]), []).append(row)
+    lines = [
+        "| scene | cap | n | failed | time s | distance m | mean m/s | least coverage % "
+        "| collisions | least clearance m |",
+        "|---|---|---|---|---|---|---|---|---|---|",
+    ]
+    for (title, cap), group in groups.items():
+        good = [row for row in group if is_good(row)]
+        coverage = [dict(row, percent=100 * float(row["coverage"] or 0)) for row in group]
+        cells = [
+            title,
+            cap,
+            str(len(group)),
+            str(len(group) - len(good)),
+            _mean(good, "completion_time_s", 1),
+            _mean(good, "distance_m", 0),
+            _mean(good, "speed_mean_mps", 2),
+            _worst(coverage, "percent", min, 2),
+            str(sum(int(row["collisions"] or 0) for row in group)),
+            _worst(group, "min_clearance_m", min, 2),
+        ]
+        lines.append("| " + " | ".join(cells) + " |")
+    return "\n".join(lines) + "\n"

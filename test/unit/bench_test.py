@@ -1,0 +1,181 @@
+#!/usr/bin/python3
+# Copyright 2026 the Understory authors
+# SPDX-License-Identifier: BSD-3-Clause
+"""Tables of missions: what is flown, what is kept, what is said of it, and bad table files."""
+
+import json
+import os
+import pathlib
+import subprocess
+import sys
+import tempfile
+import unittest
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(ROOT / "src" / "understory_sim" / "bench"))
+from rows import COLUMNS, append_row, is_good, markdown, read_rows, row_of  # noqa: E402
+from table_file import Mission, TableError, read_table  # noqa: E402
+
+
+class TemporaryFolder(unittest.TestCase):
+    """A folder that is gone afterwards."""
+
+    def setUp(self):
+        keeper = tempfile.TemporaryDirectory()
+        self.addCleanup(keeper.cleanup)
+        self.folder = pathlib.Path(keeper.name)
+
+    def write(self, name, text):
+        path = self.folder / name
+        path.write_text(text, encoding="utf-8")
+        return path
+
+
+class TableFiles(TemporaryFolder):
+    """Which missions a file names."""
+
+    def test_every_scenario_seed_and_cap(self):
+        path = self.write("t.yaml", "scenarios: [a, b]\nseeds: 3\nspeed_caps: [paper, strict]\n")
+        missions = read_table(path, self.folder)
+        self.assertEqual(len(missions), 12)
+        self.assertEqual(missions[0], Mission("a", "", 1, "paper"))
+        self.assertEqual(missions[-1], Mission("b", "", 3, "strict"))
+        self.assertEqual(len({mission.name for mission in missions}), 12)
+
+    def test_forests_are_found_relative_to_the_project(self):
+        (self.folder / "project").mkdir()
+        for name in ("f_s2.csv", "f_s1.csv"):
+            self.write(name, "")
+        path = self.write("t.yaml", "scenario: a\nforests: ../*.csv\nspeed_caps: [paper]\n")
+        missions = read_table(path, self.folder / "project")
+        self.assertEqual([mission.scene for mission in missions], ["f_s1", "f_s2"])
+
+    def test_our_tables_name_scenarios_that_exist(self):
+        tables = sorted((ROOT / "config" / "tables").glob("*.yaml"))
+        self.assertGreaterEqual(len(tables), 3)
+        known = {path.stem for path in (ROOT / "config" / "scenarios").glob("*.yaml")}
+        for path in tables:
+            try:
+                missions = read_table(path, ROOT)
+            except TableError as error:  # the forests need not be beside the project
+                self.assertIn("no file matches", str(error))
+                continue
+            self.assertLessEqual({mission.scenario for mission in missions}, known)
+
+    def test_bad_files_are_refused_with_file_and_key(self):
+        for content, key in (
+            ("scenario: a\nsede: 3\n", "sede"),
+            ("scenario: a\nseeds: 0\n", "seeds"),
+            ("scenario: a\nseeds: many\n", "seeds"),
+            ("scenario: a\nspeed_caps: [fast]\n", "speed_caps"),
+            ("scenario: a\nforests: nowhere/*.csv\n", "forests"),
+            ("seeds: 2\n", "scenario"),
+            ("scenarios: [1]\n", "scenario"),
+            ("- a\n", "expected keys"),
+            ("a: [\n", "not YAML"),
+        ):
+            path = self.write("bad.yaml", content)
+            with self.assertRaises(TableError, msg=content) as caught:
+                read_table(path, self.folder)
+            self.assertIn("bad.yaml", str(caught.exception))
+            self.assertIn(key, str(caught.exception))
+            self.assertNotIn("\n", str(caught.exception))
+
+    def test_missing_file_is_named(self):
+        with self.assertRaisesRegex(TableError, "gone.yaml"):
+            read_table(self.folder / "gone.yaml", self.folder)
+
+
+RESULT = {
+    "completed": True,
+    "stop_reason": "nothing_left",
+    "completion_time_s": 100.0,
+    "coverage": 0.995,
+    "distance_m": 110.0,
+    "speed_mean_mps": 1.1,
+    "collisions": 0,
+    "min_clearance_m": 0.31,
+    "stages": {"decision": {"p50_ms": 4.0, "p99_ms": 9.0}},
+}
+
+
+class Rows(TemporaryFolder):
+    """What is kept of a mission."""
+
+    def row(self, scene="f_s1", cap="paper", **changes):
+        (self.folder / "result.json").write_text(json.dumps(dict(RESULT, **changes)))
+        return row_of(Mission("a", f"{scene}.csv", 1, cap), self.folder, "", "abc")
+
+    def test_survive_the_file(self):
+        path = self.folder / "rows.csv"
+        first, second = self.row(), self.row("f_s2", error="said, \"so\"")
+        for row in (first, second):
+            append_row(path, row)
+        rows = read_rows(path)
+        self.assertEqual(list(rows), [("f_s1", "1", "paper"), ("f_s2", "1", "paper")])
+        self.assertEqual(rows["f_s1", "1", "paper"], first)
+        self.assertEqual(first["decision_p99_ms"], "9.0")
+
+    def test_a_last_row_cut_short_is_flown_again(self):
+        path = self.folder / "rows.csv"
+        append_row(path, self.row())
+        with path.open("a", encoding="utf-8") as lines:
+            lines.write("f_s2,1")
+        self.assertEqual(list(read_rows(path)), [("f_s1", "1", "paper")])
+
+    def test_failures_are_kept_and_not_good(self):
+        self.assertTrue(is_good(self.row()))
+        self.assertFalse(is_good(self.row(collisions=1)))
+        self.assertFalse(is_good(self.row(completed=False, completion_time_s=None)))
+        (self.folder / "result.json").unlink()
+        row = row_of(Mission("a", "", 1, "paper"), self.folder, "no such scenario", "abc")
+        self.assertFalse(is_good(row))
+        self.assertEqual(set(row), set(COLUMNS))
+
+    def test_table_has_mean_deviation_and_failures(self):
+        rows = [
+            self.row("f_s1"),
+            self.row("f_s2", completion_time_s=120.0),
+            self.row("f_s3", collisions=2, coverage=0.5),
+        ]
+        lines = markdown(rows, lambda row: "f").splitlines()
+        self.assertEqual(len(lines), 3)
+        cells = [cell.strip() for cell in lines[2].split("|")]
+        self.assertEqual(cells[1:6], ["f", "paper", "3", "1", "110.0 ± 14.1"])
+        self.assertEqual(cells[8:10], ["50.00", "2"])
+
+
+class Command(TemporaryFolder):
+    """The command as a user meets it, without flying."""
+
+    def bench(self, *words):
+        return subprocess.run(
+            [sys.executable, str(ROOT / "src/understory_sim/bench/bench.py"), *words],
+            env=dict(os.environ, UNDERSTORY_ROOT=str(ROOT)),
+            cwd=self.folder,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            encoding="utf-8",
+            check=False,
+        )
+
+    def test_unknown_table_is_one_line_with_the_known_ones(self):
+        done = self.bench("--table", "nothing")
+        self.assertEqual(done.returncode, 2)
+        self.assertEqual(len(done.stderr.splitlines()), 1)
+        self.assertIn("generated", done.stderr)
+
+    def test_folder_that_cannot_be_written_is_found_at_start(self):
+        self.write("occupied", "")
+        done = self.bench("--table", "generated", "--out", "occupied/here")
+        self.assertEqual(done.returncode, 2)
+        self.assertIn("occupied", done.stderr)
+
+    def test_help(self):
+        done = self.bench("--help")
+        self.assertEqual(done.returncode, 0)
+        self.assertIn("--table", done.stdout)
+
+
+if __name__ == "__main__":
+    unittest.main()
