@@ -8,6 +8,7 @@
 
 #include <gtest/gtest.h>
 
+#include "support/snapshot_builder.hpp"
 #include "support/temporary_folder.hpp"
 #include "understory/map/octomap_io.hpp"
 #include "understory/sim/forest_csv.hpp"
@@ -116,6 +117,27 @@ TEST(Mission, UnreachablePocketDoesNotKeepTheMissionAlive) {
 
   EXPECT_TRUE(result.completed) << result.stop_reason;
   EXPECT_EQ(result.collisions, 0U);
+}
+
+TEST(Mission, TargetsThatShowNothingAreSetAsideThenGivenUp) {
+  SimulationConfig config = square_scene(5.0, 0.0);
+  config.depth_noise.dropout_probability = 1.0;  // the camera is blind
+  config.explorer.retry.set_aside_s = 3.0;
+  const Box3d box_m = config.scene.box.box_m();
+  Box3d known_m = box_m;
+  known_m.min().x() = -3.0;
+  known_m.max().x() = 3.0;
+  test::SnapshotBuilder builder(config.explorer.map.resolution_m, box_m);
+  builder.set_box(known_m, VoxelState::kFree);
+
+  MissionRun run({config, 1, *builder.build()});
+  run.fly([] { return false; }, [](const TickRow&) {});
+
+  const MissionResult result = run.result();
+  EXPECT_TRUE(result.completed) << result.stop_reason;
+  EXPECT_EQ(result.collisions, 0U);
+  EXPECT_GE(result.counters.at("given_up"), 2U) << "at either end of what is known";
+  EXPECT_GT(result.counters.at("set_aside"), result.counters.at("given_up")) << "tried again";
 }
 
 TEST(Mission, InterruptedMissionComesToRestAndKeepsItsResult) {

@@ -78,13 +78,11 @@ class LatticeSearch {
       const Vector3i next_lattice =
           lattice_of(slot) + Vector3i(i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1);
       const Vector3d to_m = next_lattice.cast<double>() * kLattice_m;
-      if (!map_.clearance_at_least(to_m, clearance_m_) ||
-          !map_.clearance_at_least(0.5 * (from_m + to_m), clearance_m_)) {
-        continue;
-      }
       const std::size_t next = slot_of(next_lattice);
       const double length_m = length_m_[slot] + (to_m - from_m).norm();
-      if (length_m < length_m_[next] - 1e-9) {
+      // Clearance last, it costs most. What is clear has all its neighbours in the box.
+      if (length_m < length_m_[next] - 1e-9 && map_.clearance_at_least(to_m, clearance_m_) &&
+          map_.clearance_at_least(0.5 * (from_m + to_m), clearance_m_)) {
         length_m_[next] = length_m;
         parent_[next] = slot;
         open_.emplace(length_m + (to_m - goal_m).norm(), next);
