@@ -74,6 +74,11 @@ Limits raised_by_start(const TrajectoryRequirements& required) {
   const TrajectoryPoint& start = required.start;
   Limits limits = required.limits;
   limits.speed_mps = std::max(limits.speed_mps, start.velocity_mps.norm());
+  if (start.acceleration_mps2.norm() > limits.acceleration_mps2) {
+    // It fades to what is allowed within a knot of 0.1 s.
+    const Vector3d fastest_mps = start.velocity_mps + 0.05 * start.acceleration_mps2;
+    limits.speed_mps = std::max(limits.speed_mps, fastest_mps.norm());
+  }
   limits.acceleration_mps2 = std::max(limits.acceleration_mps2, start.acceleration_mps2.norm());
   limits.yaw_rate_radps = std::max(limits.yaw_rate_radps, std::abs(start.yaw_rate_radps));
   limits.yaw_acceleration_radps2 =

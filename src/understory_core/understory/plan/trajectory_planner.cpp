@@ -42,10 +42,15 @@ CubicBSpline<double>::Sample yaw_state(const TrajectoryPoint& point) {
   return {point.yaw_rad, point.yaw_rate_radps, point.yaw_acceleration_radps2};
 }
 
-// A vehicle that is faster than a new mode allows cannot be slower at once.
+// A vehicle that is faster than a new mode allows cannot be slower at once, and one that gains
+// speed faster than it allows gains more until the first knot.
 Limits limits_including(const Limits& limits, const TrajectoryPoint& start) {
   Limits raised = limits;
   raised.speed_mps = std::max(limits.speed_mps, start.velocity_mps.norm());
+  if (start.acceleration_mps2.norm() > limits.acceleration_mps2) {
+    const Vector3d gained_mps = 0.5 * kKnot_s * start.acceleration_mps2;
+    raised.speed_mps = std::max(raised.speed_mps, (start.velocity_mps + gained_mps).norm());
+  }
   raised.acceleration_mps2 = std::max(limits.acceleration_mps2, start.acceleration_mps2.norm());
   raised.yaw_rate_radps = std::max(limits.yaw_rate_radps, std::abs(start.yaw_rate_radps));
   raised.yaw_acceleration_radps2 =

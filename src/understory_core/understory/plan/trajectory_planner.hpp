@@ -5,7 +5,9 @@
 // B-spline fitted to it, optimised for smoothness, clearance and limits, then time adjustment
 // (Zhou et al. 2019), yaw as a spline of its own. Starts exactly in the given state (position,
 // velocity, acceleration, yaw, yaw rate), ends at rest. World frame, SI units. Deterministic; one
-// thread. What comes back holds its limits at every 100 Hz sample and passed check_trajectory.
+// thread. What comes back holds its limits at every 100 Hz sample and is clear at each of them.
+// A start beyond the limits asked for (a Collector becomes an Explorer) raises those that it comes
+// with: the vehicle can neither be slower nor gain less speed at once.
 #pragma once
 
 #include <optional>
