@@ -42,7 +42,8 @@ TEST(SimulationConfig, EveryMisspeltKeyIsAnErrorThatNamesIt) {
 TEST(SimulationConfig, EveryShippedFileLoads) {
   int files = 0;
   for (const auto& entry : std::filesystem::recursive_directory_iterator(config_folder())) {
-    if (entry.path().extension() == ".yaml") {
+    const bool is_table = entry.path().parent_path().filename() == "tables";
+    if (entry.path().extension() == ".yaml" && !is_table) {
       SimulationConfig config;
       EXPECT_NO_THROW(load_config_file(entry.path().string(), config)) << entry.path();
       ++files;

@@ -53,18 +53,6 @@ def table_path(name):
     return path
 
 
-def commit():
-    """Of the project, with a + if files differ from it; unknown outside of a clone."""
-    done = subprocess.run(
-        ["git", "-C", str(ROOT), "describe", "--always", "--dirty=+", "--exclude=*"],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.DEVNULL,
-        encoding="utf-8",
-        check=False,
-    )
-    return done.stdout.strip() or "unknown"
-
-
 class Bench:
     """Missions in flight, and their rows."""
 
@@ -72,7 +60,7 @@ class Bench:
         self.folder = folder
         self.csv = folder / "rows.csv"
         self.keep_folders = keep_folders
-        self.commit = commit()
+        self.commit = os.environ.get("UNDERSTORY_COMMIT", "unknown")
         self.interrupted = threading.Event()
 
     def fly(self, mission):

@@ -72,6 +72,8 @@ bool make_report(const std::string& folder) {
 void write_folder(const std::string& folder, const MissionRun& run) {
   const fs::path path(folder);
   MissionResult result = run.result();
+  const char* commit = std::getenv("UNDERSTORY_COMMIT");
+  result.commit = commit == nullptr ? "" : commit;
   write_text_file((path / "config.yaml").string(), to_yaml(run.config()));
   write_trunks((path / "trunks.csv").string(), run.forest().trunks, run.config().scene.box.box_m());
   result.topview = write_topview(run.map(), (path / "topview.pgm").string());
