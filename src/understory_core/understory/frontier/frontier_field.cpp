@@ -9,13 +9,12 @@ namespace {
 
 // The bits of a tile's rows that lie inside the box.
 std::uint16_t row_mask(const GridGeometry& geometry, int tile_x) {
-  const int low = std::max(geometry.voxels().min.x() - tile_x * kTileVoxels, 0);
-  const int high = std::min(geometry.voxels().end.x() - tile_x * kTileVoxels, kTileVoxels);
-  std::uint32_t mask = 0;
-  for (int bit = low; bit < high; ++bit) {
-    mask |= 1U << static_cast<unsigned>(bit);
-  }
-  return static_cast<std::uint16_t>(mask);
+  const auto bits_below = [&](int end) {
+    return (1U << static_cast<unsigned>(std::clamp(end - tile_x * kTileVoxels, 0, kTileVoxels))) -
+           1U;
+  };
+  return static_cast<std::uint16_t>(bits_below(geometry.voxels().end.x()) &
+                                    ~bits_below(geometry.voxels().min.x()));
 }
 
 // Row-wise access to what is unknown, across tile borders.

@@ -83,13 +83,15 @@ class UnknownIsland {
         return false;
       }
     }
-    for (std::size_t next = 0; next < open.size(); ++next) {
-      const VoxelIndex voxel = open[next];
-      if (open.size() > max_voxels || !spread(voxel, open)) {
+    // Depth first: in the open it runs straight out of the window.
+    while (!open.empty()) {
+      const VoxelIndex voxel = open.back();
+      open.pop_back();
+      ++voxel_count_;
+      if (voxel_count_ + open.size() > max_voxels || !spread(voxel, open)) {
         return false;
       }
     }
-    voxel_count_ = open.size();
     return true;
   }
 

@@ -124,16 +124,20 @@ std::vector<Viewpoint> ViewpointSampler::sample(const ClearanceMap& map,
   for (std::size_t i = 0; i < count; ++i) {
     sampled.push_back(map.geometry().center_of(cluster.voxels[i * cluster.voxels.size() / count]));
   }
+  // Fewer can no longer come to the least coverage, so the rest need not be looked at.
+  const auto needed = std::max<std::size_t>(
+      1, static_cast<std::size_t>(std::ceil(config_.min_coverage * static_cast<double>(count))));
   std::vector<Viewpoint> viewpoints;
   for (const RouteLattice::Node& node : candidates(map, routes, cluster)) {
     const Vector3d position = routes.lattice().point_of(node);
     std::vector<double> bearings;
-    for (const Vector3d& voxel : sampled) {
-      if (sees(map, position, voxel)) {
-        bearings.push_back(std::atan2(voxel.y() - position.y(), voxel.x() - position.x()));
+    for (std::size_t i = 0; i < count && bearings.size() + (count - i) >= needed; ++i) {
+      if (sees(map, position, sampled[i])) {
+        bearings.push_back(
+            std::atan2(sampled[i].y() - position.y(), sampled[i].x() - position.x()));
       }
     }
-    if (bearings.empty()) {
+    if (bearings.size() < needed) {
       continue;
     }
     const YawChoice yaw = best_yaw(std::move(bearings), half_horizontal_fov_rad_);

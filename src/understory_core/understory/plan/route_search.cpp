@@ -89,8 +89,10 @@ void RouteSearch::enter_lattice(const ClearanceMap& map) {
   }
 }
 
-void RouteSearch::relax(const ClearanceMap& map, std::size_t from, const Step& step) {
-  const RouteLattice::Node node = lattice_.node_of_index(from);
+void RouteSearch::relax(const ClearanceMap& map,
+                        const RouteLattice::Node& node,
+                        std::size_t from,
+                        const Step& step) {
   const RouteLattice::Node next = node + step.offset;
   if (!lattice_.contains(next)) {
     return;
@@ -152,8 +154,9 @@ void RouteSearch::run(const ClearanceMap& map,
       }
       state.is_settled = true;
       open_targets -= state.is_target ? 1U : 0U;
+      const RouteLattice::Node node = lattice_.node_of_index(index);
       for (const auto& step : kSteps) {
-        relax(map, index, {{step[0], step[1], step[2]}, static_cast<std::uint32_t>(step[3])});
+        relax(map, node, index, {{step[0], step[1], step[2]}, static_cast<std::uint32_t>(step[3])});
       }
     }
   }

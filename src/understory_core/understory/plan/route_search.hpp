@@ -54,7 +54,10 @@ class RouteSearch {
   };
 
   void enter_lattice(const ClearanceMap& map);
-  void relax(const ClearanceMap& map, std::size_t from, const Step& step);
+  void relax(const ClearanceMap& map,
+             const RouteLattice::Node& node,
+             std::size_t from,
+             const Step& step);
   void offer(std::size_t index, std::uint32_t cost, std::int32_t parent);
   NodeState& state_in_this_run(std::size_t index);
 
