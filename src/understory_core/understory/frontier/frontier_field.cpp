@@ -3,6 +3,7 @@
 #include "understory/frontier/frontier_field.hpp"
 
 #include <algorithm>
+#include <array>
 
 namespace understory {
 namespace {
@@ -17,28 +18,61 @@ std::uint16_t row_mask(const GridGeometry& geometry, int tile_x) {
                                     ~bits_below(geometry.voxels().min.x()));
 }
 
-// Row-wise access to what is unknown, across tile borders.
+// Row-wise access to what is unknown in a tile and beside it.
 class UnknownRows {
  public:
-  explicit UnknownRows(const MapSnapshot& snapshot) : snapshot_(snapshot) {}
-
-  // Unknown voxels of the box in the row of tile column tile_x at voxel coordinates y, z.
-  [[nodiscard]] std::uint32_t at(int tile_x, int y, int z) const {
-    const GridGeometry& geometry = snapshot_.geometry;
-    const VoxelBox& box = geometry.voxels();
-    const Vector3i tile(tile_x, y >> kTileShift, z >> kTileShift);
-    if (y < box.min.y() || y >= box.end.y() || z < box.min.z() || z >= box.end.z() ||
-        !geometry.has_tile(tile)) {
-      return 0;
-    }
-    const std::uint32_t mask = row_mask(geometry, tile_x);
-    const Tile* content = snapshot_.tiles[geometry.slot_of_tile(tile)].get();
-    return content == nullptr ? mask
-                              : mask & ~std::uint32_t{content->known_rows[row_in_tile(y, z)]};
+  UnknownRows(const MapSnapshot& snapshot, const Vector3i& tile)
+      : box_(snapshot.geometry.voxels()), own_z_(tile.z()), own_y_(tile.y()) {
+    const auto column = [&](int dx, int dy, int dz) {
+      const Vector3i place = tile + Vector3i(dx, dy, dz);
+      const bool is_there = snapshot.geometry.has_tile(place);
+      const Tile* content =
+          is_there ? snapshot.tiles[snapshot.geometry.slot_of_tile(place)].get() : nullptr;
+      return Column{content, is_there ? row_mask(snapshot.geometry, place.x()) : std::uint16_t{0}};
+    };
+    own_ = column(0, 0, 0);
+    left_ = column(-1, 0, 0);
+    right_ = column(1, 0, 0);
+    beside_y_ = {column(0, -1, 0), column(0, 1, 0)};
+    beside_z_ = {column(0, 0, -1), column(0, 0, 1)};
   }
 
+  // Unknown voxels of the box in a row of the tile, y or z being at most one beyond it.
+  [[nodiscard]] std::uint32_t own(int y, int z) const {
+    if (y < box_.min.y() || y >= box_.end.y() || z < box_.min.z() || z >= box_.end.z()) {
+      return 0;
+    }
+    const int dy = (y >> kTileShift) - own_y_;
+    const int dz = (z >> kTileShift) - own_z_;
+    const Column& column = dy != 0   ? beside_y_[dy < 0 ? 0 : 1]
+                           : dz != 0 ? beside_z_[dz < 0 ? 0 : 1]
+                                     : own_;
+    return unknown(column, y, z);
+  }
+  // The same of the tiles before and behind along x; y and z within the tile.
+  [[nodiscard]] std::uint32_t left(int y, int z) const { return unknown(left_, y, z); }
+  [[nodiscard]] std::uint32_t right(int y, int z) const { return unknown(right_, y, z); }
+
  private:
-  const MapSnapshot& snapshot_;
+  struct Column {
+    const Tile* tile = nullptr;  // null: unknown throughout
+    std::uint16_t mask = 0;      // what of it lies inside the box
+  };
+
+  [[nodiscard]] static std::uint32_t unknown(const Column& column, int y, int z) {
+    const std::uint32_t known =
+        column.tile == nullptr ? 0U : column.tile->known_rows[row_in_tile(y, z)];
+    return column.mask & ~known;
+  }
+
+  VoxelBox box_;
+  int own_z_;
+  int own_y_;
+  Column own_;
+  Column left_;
+  Column right_;
+  std::array<Column, 2> beside_y_;
+  std::array<Column, 2> beside_z_;
 };
 
 bool same_classes(const Tile* a, const Tile* b) {
@@ -78,7 +112,7 @@ void FrontierField::refresh_tile(const MapSnapshot& snapshot, TileSlot slot, Cha
   const GridGeometry& geometry = snapshot.geometry;
   const Vector3i coordinates = geometry.tile_of_slot(slot);
   const VoxelBox box = geometry.voxels_of_slot(slot);
-  const UnknownRows unknown(snapshot);
+  const UnknownRows unknown(snapshot, coordinates);
   for (int z = box.min.z(); z < box.end.z(); ++z) {
     for (int y = box.min.y(); y < box.end.y(); ++y) {
       const std::size_t row = row_in_tile(y, z);
@@ -86,14 +120,11 @@ void FrontierField::refresh_tile(const MapSnapshot& snapshot, TileSlot slot, Cha
       const std::uint32_t before = rows_[slot] ? (*rows_[slot])[row] : 0U;
       std::uint32_t now = 0;
       if (free != 0) {
-        const std::uint32_t own = unknown.at(coordinates.x(), y, z);
-        const std::uint32_t left = (own << 1U) | (unknown.at(coordinates.x() - 1, y, z) >> 15U);
-        const std::uint32_t right =
-            (own >> 1U) | ((unknown.at(coordinates.x() + 1, y, z) & 1U) << 15U);
-        now =
-            free & (left | right | unknown.at(coordinates.x(), y - 1, z) |
-                    unknown.at(coordinates.x(), y + 1, z) | unknown.at(coordinates.x(), y, z - 1) |
-                    unknown.at(coordinates.x(), y, z + 1));
+        const std::uint32_t own = unknown.own(y, z);
+        const std::uint32_t left = (own << 1U) | (unknown.left(y, z) >> 15U);
+        const std::uint32_t right = (own >> 1U) | ((unknown.right(y, z) & 1U) << 15U);
+        now = free & (left | right | unknown.own(y - 1, z) | unknown.own(y + 1, z) |
+                      unknown.own(y, z - 1) | unknown.own(y, z + 1));
       }
       if (now == before) {
         continue;

@@ -107,13 +107,37 @@ std::vector<RouteLattice::Node> ViewpointSampler::candidates(const ClearanceMap&
   return nodes;
 }
 
-bool ViewpointSampler::sees(const ClearanceMap& map,
-                            const Vector3d& from_m,
-                            const Vector3d& to_m) const {
+bool ViewpointSampler::is_in_reach(const Vector3d& from_m, const Vector3d& to_m) const {
   const Vector3d ray = to_m - from_m;
-  const double horizontal_m = ray.head<2>().norm();
-  return ray.norm() <= max_range_m_ && std::abs(ray.z()) <= vertical_slope_ * horizontal_m &&
-         line_is_free(map, from_m, to_m);
+  const double horizontal_square = ray.head<2>().squaredNorm();
+  return ray.squaredNorm() <= max_range_m_ * max_range_m_ &&
+         ray.z() * ray.z() <= vertical_slope_ * vertical_slope_ * horizontal_square;
+}
+
+// The bearings of those in view, or of fewer than `needed` when so many cannot be.
+std::vector<double> ViewpointSampler::bearings_in_view(const ClearanceMap& map,
+                                                       const Vector3d& from_m,
+                                                       const std::vector<Vector3d>& places_m,
+                                                       std::size_t needed) const {
+  std::vector<double> bearings;
+  auto possible = static_cast<std::size_t>(
+      std::count_if(places_m.begin(), places_m.end(), [&](const Vector3d& place_m) {
+        return is_in_reach(from_m, place_m);
+      }));
+  for (const Vector3d& place_m : places_m) {
+    if (possible < needed) {
+      break;
+    }
+    if (!is_in_reach(from_m, place_m)) {
+      continue;
+    }
+    if (line_is_free(map, from_m, place_m)) {
+      bearings.push_back(std::atan2(place_m.y() - from_m.y(), place_m.x() - from_m.x()));
+    } else {
+      --possible;
+    }
+  }
+  return bearings;
 }
 
 std::vector<Viewpoint> ViewpointSampler::sample(const ClearanceMap& map,
@@ -124,19 +148,12 @@ std::vector<Viewpoint> ViewpointSampler::sample(const ClearanceMap& map,
   for (std::size_t i = 0; i < count; ++i) {
     sampled.push_back(map.geometry().center_of(cluster.voxels[i * cluster.voxels.size() / count]));
   }
-  // Fewer can no longer come to the least coverage, so the rest need not be looked at.
   const auto needed = std::max<std::size_t>(
       1, static_cast<std::size_t>(std::ceil(config_.min_coverage * static_cast<double>(count))));
   std::vector<Viewpoint> viewpoints;
   for (const RouteLattice::Node& node : candidates(map, routes, cluster)) {
     const Vector3d position = routes.lattice().point_of(node);
-    std::vector<double> bearings;
-    for (std::size_t i = 0; i < count && bearings.size() + (count - i) >= needed; ++i) {
-      if (sees(map, position, sampled[i])) {
-        bearings.push_back(
-            std::atan2(sampled[i].y() - position.y(), sampled[i].x() - position.x()));
-      }
-    }
+    std::vector<double> bearings = bearings_in_view(map, position, sampled, needed);
     if (bearings.size() < needed) {
       continue;
     }

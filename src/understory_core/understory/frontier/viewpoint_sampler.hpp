@@ -29,9 +29,11 @@ class ViewpointSampler {
   [[nodiscard]] std::vector<RouteLattice::Node> candidates(const ClearanceMap& map,
                                                            const RouteSearch& routes,
                                                            const Cluster& cluster) const;
-  [[nodiscard]] bool sees(const ClearanceMap& map,
-                          const Vector3d& from_m,
-                          const Vector3d& to_m) const;
+  [[nodiscard]] bool is_in_reach(const Vector3d& from_m, const Vector3d& to_m) const;
+  [[nodiscard]] std::vector<double> bearings_in_view(const ClearanceMap& map,
+                                                     const Vector3d& from_m,
+                                                     const std::vector<Vector3d>& places_m,
+                                                     std::size_t needed) const;
 
   ViewpointConfig config_;
   double half_horizontal_fov_rad_;
