@@ -103,7 +103,7 @@ TrajectoryRequirements brake_requirements(const Trajectory& flown,
 std::string fault_in(const Trajectory& trajectory,
                      const MapSnapshot& map,
                      const TrajectoryRequirements& required) {
-  const std::string joint = fault_at_start(trajectory, required) + fault_at_end(trajectory);
+  std::string joint = fault_at_start(trajectory, required) + fault_at_end(trajectory);
   if (!joint.empty()) {
     return joint;
   }
@@ -111,7 +111,7 @@ std::string fault_in(const Trajectory& trajectory,
   const double reach_m = required.radius_m + 0.01;
   for (Time time = trajectory.start;; time += kSamplePeriod) {
     const TrajectoryPoint point = trajectory.sample(time);
-    const std::string fault = fault_in_limits(point, time, limits);
+    std::string fault = fault_in_limits(point, time, limits);
     if (!fault.empty()) {
       return fault;
     }

@@ -65,6 +65,7 @@ struct FrontierConfig {
   double max_cluster_length_m = 2.0;
   int min_cluster_voxels = 40;
   double min_island_m3 = 0.0;
+  double min_island_share = 1.0;
   double seen_share = 0.2;
   ViewpointConfig viewpoints;
   TrailConfig trails;
@@ -83,6 +84,10 @@ struct FrontierConfig {
             in_range(0.0, 1000.0),
             "nor are clusters that border an island of unknown space smaller than this (a trunk's "
             "inside counts)");
+    f.field("min_island_share",
+            min_island_share,
+            in_range(0.0, 1.0),
+            "and than this share of the box, of which it would be a larger part if that is small");
     f.field("seen_share",
             seen_share,
             in_range(0.01, 1.0),

@@ -35,7 +35,8 @@ FrontierFinder::FrontierFinder(const FrontierConfig& config,
                                const GridGeometry& geometry)
     : config_(config),
       sampler_(config.viewpoints, camera),
-      max_range_m_(camera.max_range_m),
+      min_island_m3_(
+          std::min(config.min_island_m3, config.min_island_share * geometry.box_m().volume())),
       geometry_(geometry),
       field_(geometry),
       owners_(geometry.slot_count()) {}
@@ -186,7 +187,7 @@ void FrontierFinder::refresh(const ClearanceMap& map,
       const Surroundings around = surroundings_of(map.snapshot(), cluster, config_.trails);
       const bool trail = around.is_free_all_around || neighbour_count(cluster) <= lone;
       cluster.label = trail ? ClusterLabel::kTrail : ClusterLabel::kFrontier;
-      cluster.is_worthless = around.island_m3 && *around.island_m3 < config_.min_island_m3;
+      cluster.is_worthless = around.island_m3 && *around.island_m3 < min_island_m3_;
     }
     if (resample) {
       cluster.viewpoints = sampler_.sample(map, routes, cluster);

@@ -58,7 +58,7 @@ class FrontierFinder {
 
   FrontierConfig config_;
   ViewpointSampler sampler_;
-  double max_range_m_;
+  double min_island_m3_;
   GridGeometry geometry_;
   FrontierField field_;
   FrontierField::Change pending_;                // since the last form()
