@@ -93,6 +93,17 @@ PositionSpline spline_through(const SampledMotion& motion, const Task& task) {
   return spline;
 }
 
+// Against the limits the optimiser finds time cheap: from a start that is too fast, or flies the
+// other way, it may end with ten times the time it takes to stop and to begin anew.
+bool is_sluggish(double duration_s, const Task& task) {
+  constexpr double kFactor = 1.3;
+  constexpr double kSlack_s = 1.0;
+  const double speed_mps = task.start.first.norm();
+  const double stop_s = speed_mps / task.limits.acceleration_mps2;
+  const RouteGuide from_rest(task.vertices_m, Vector3d::Zero(), task.limits);
+  return duration_s > kFactor * (stop_s + from_rest.time_to_go_s(0.0)) + kSlack_s;
+}
+
 // Whether a spline may be flown, as the planner decides it.
 using Verdict = std::function<std::optional<PlanError>(const PositionSpline&)>;
 
@@ -227,10 +238,17 @@ Result<Trajectory, PlanError> TrajectoryPlanner::plan(const ClearanceMap& map,
     }
     return std::nullopt;
   };
+  std::optional<Trajectory> smooth;
   if (task.vertices_m.size() > 1 && optimised(task, config_.preferred_clearance_m, verdict)) {
-    return trajectory;
+    smooth = trajectory;
+    if (!is_sluggish(smooth->position.duration_s(), task)) {
+      return *smooth;
+    }
   }
   const std::optional<PlanError> error = verdict(stop_at_corners(task));
+  if (smooth && (error || smooth->position.duration_s() <= trajectory.position.duration_s())) {
+    return *smooth;
+  }
   if (error) {
     return *error;
   }
