@@ -77,6 +77,24 @@ bool Explorer::reaches_target(const Pilot& pilot) const {
                             .norm() < pilot.clearance().geometry().resolution_m();
 }
 
+bool Explorer::has_open_clusters() const {
+  return std::any_of(
+      finder_.clusters().begin(), finder_.clusters().end(), [this](const ClusterPtr& cluster) {
+        return !cluster->is_dormant() && !set_aside_.is_given_up(*cluster);
+      });
+}
+
+// Takes what is flown far longer than the rest of the way should? A plan made in fast flight may;
+// one made from what is slow by now will not.
+bool Explorer::is_sluggish(const Pilot& pilot, Time now) const {
+  constexpr double kFactor = 2.0;
+  constexpr double kSlack_s = 3.0;
+  const Trajectory& flown = *pilot.follower().newest();
+  const double left_m =
+      (flown.position.control_points.back() - flown.sample(now).position_m).norm();
+  return to_seconds(flown.end() - now) > kFactor * left_m / config_.limits.speed_mps + kSlack_s;
+}
+
 bool Explorer::is_due(const Pilot& pilot, Time now) const {
   const double waited_s = to_seconds(now - last_decision_);
   if (counters_.decisions == 0) {
@@ -85,7 +103,7 @@ bool Explorer::is_due(const Pilot& pilot, Time now) const {
   if (waited_s < config_.replan.min_interval_s) {
     return false;
   }
-  if (!target_) {
+  if (!target_ || is_sluggish(pilot, now)) {
     return true;
   }
   if (!reaches_target(pilot)) {
@@ -155,7 +173,8 @@ TrajectoryPtr Explorer::try_targets(
     if (!target) {
       return nullptr;
     }
-    if (attempt == 0 && !in_danger && is_on_the_way_to(*target, pilot)) {
+    if (attempt == 0 && !in_danger && is_on_the_way_to(*target, pilot) &&
+        !is_sluggish(pilot, now)) {
       return nullptr;
     }
     const Result<TrajectoryPtr, PlanError> flown =

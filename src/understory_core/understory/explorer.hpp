@@ -47,6 +47,8 @@ class Explorer {
   // Call after observe(), with the pilot on the same map.
   ExploreStep step(Pilot& pilot, Time now);
 
+  // Is something left that could be seen from somewhere and was not given up?
+  [[nodiscard]] bool has_open_clusters() const;
   [[nodiscard]] const std::vector<ClusterPtr>& clusters() const { return finder_.clusters(); }
   [[nodiscard]] const std::optional<Target>& target() const { return target_; }
   [[nodiscard]] FlightMode mode() const { return mode_; }
@@ -59,6 +61,7 @@ class Explorer {
  private:
   enum class Reach : std::uint8_t { kNear, kAll, kAllAndSetAside, kThroughTightGaps };
 
+  [[nodiscard]] bool is_sluggish(const Pilot& pilot, Time now) const;
   [[nodiscard]] bool is_due(const Pilot& pilot, Time now) const;
   [[nodiscard]] bool reaches_target(const Pilot& pilot) const;
   [[nodiscard]] bool is_on_the_way_to(const Target& target, const Pilot& pilot) const;

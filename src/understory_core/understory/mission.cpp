@@ -9,6 +9,9 @@ namespace understory {
 namespace {
 
 constexpr int kMaxFailedLegs = 20;
+constexpr int kMaxResumptions = 3;
+// In a tight place one map update may block every route, and the next one open it.
+constexpr double kConfirmNothingLeftS = 2.0;
 constexpr double kArrivedM = 0.25;
 constexpr double kRetryIntervalS = 0.5;
 constexpr double kHeadroomM = 0.5;
@@ -77,7 +80,11 @@ Box3d Mission::launch_site_m() const {
 
 void Mission::end_exploration(StopReason reason, Time now) {
   reason_ = reason;
-  explored_at_ = now;
+  if (has_explored_) {
+    explored_at_ = nothing_left_since_.value_or(now);
+    has_explored_ = false;
+  }
+  nothing_left_since_.reset();
   state_ = config_.return_home && reason == StopReason::kNothingLeft ? MissionState::kReturnHome
                                                                      : MissionState::kStopped;
 }
@@ -120,6 +127,32 @@ TrajectoryPtr Mission::climb(Time now) {
     end_exploration(StopReason::kTakeOffFailed, now);
   }
   return leg;
+}
+
+// "Nothing left" counts once it has been so for a while, if there are clusters that it may be wrong
+// about.
+TrajectoryPtr Mission::explore(const ExploreStep& step, Time now) {
+  if (step.status != ExploreStatus::kNothingLeft || step.published) {
+    nothing_left_since_ = step.decided ? std::nullopt : nothing_left_since_;
+    has_explored_ = has_explored_ || step.published != nullptr;
+    return step.published;
+  }
+  nothing_left_since_ = nothing_left_since_.value_or(now);
+  if (!explorer_.has_open_clusters() ||
+      to_seconds(now - *nothing_left_since_) >= kConfirmNothingLeftS) {
+    end_exploration(StopReason::kNothingLeft, now);
+  }
+  return nullptr;
+}
+
+// From home there may be a way to what could not be reached from where the exploration ended.
+void Mission::resume_at_home() {
+  if (state_ == MissionState::kDescend && explorer_.has_open_clusters() &&
+      resumptions_ < kMaxResumptions) {
+    ++resumptions_;
+    reason_ = StopReason::kNone;
+    state_ = MissionState::kExplore;
+  }
 }
 
 TrajectoryPtr Mission::fly_home(Time now) {
@@ -191,13 +224,11 @@ MissionStep Mission::on_map(const MapSnapshotPtr& snapshot, Time now) {
       break;
     case MissionState::kExplore:
       step.explore = explorer_.step(pilot_, now);
-      step.published = step.explore.published;
-      if (step.explore.status == ExploreStatus::kNothingLeft && !step.published) {
-        end_exploration(StopReason::kNothingLeft, now);
-      }
+      step.published = explore(step.explore, now);
       break;
     case MissionState::kReturnHome:
       step.published = fly_home(now);
+      resume_at_home();
       break;
     case MissionState::kDescend:
       step.published = descend(now);

@@ -88,6 +88,8 @@ class Mission {
  private:
   void end_exploration(StopReason reason, Time now);
   TrajectoryPtr climb(Time now);
+  TrajectoryPtr explore(const ExploreStep& step, Time now);
+  void resume_at_home();
   TrajectoryPtr fly_home(Time now);
   TrajectoryPtr descend(Time now);
   TrajectoryPtr fly_leg(const Vector3d& to_m, Time now);
@@ -101,6 +103,9 @@ class Mission {
   MissionState state_ = MissionState::kTakeOff;
   StopReason reason_ = StopReason::kNone;
   Time explored_at_{};
+  bool has_explored_ = true;  // since explored_at_ was set
+  std::optional<Time> nothing_left_since_;
+  int resumptions_ = 0;
   Time last_leg_{};
   int failed_legs_ = 0;
 };
