@@ -18,7 +18,7 @@ namespace understory {
 struct Candidate {
   ClusterPtr cluster;
   Viewpoint viewpoint;
-  double route_length_m;
+  double route_length_m = 0.0;
 };
 
 struct StrategyInput {
@@ -31,7 +31,7 @@ struct StrategyInput {
 
 struct Target {
   Candidate candidate;
-  FlightMode mode;
+  FlightMode mode = FlightMode::kExplorer;
 };
 
 class Strategy {
