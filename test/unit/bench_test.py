@@ -123,6 +123,15 @@ class Rows(TemporaryFolder):
             lines.write("f_s2,1")
         self.assertEqual(list(read_rows(path)), [("f_s1", "1", "paper")])
 
+        append_row(path, self.row("f_s3"))
+        self.assertEqual([key[0] for key in read_rows(path)], ["f_s1", "f_s3"])
+
+    def test_a_last_value_cut_short_is_not_taken_for_whole(self):
+        path = self.folder / "rows.csv"
+        append_row(path, self.row())
+        path.write_bytes(path.read_bytes()[:-2])
+        self.assertEqual(read_rows(path), {})
+
     def test_failures_are_kept_and_not_good(self):
         self.assertTrue(is_good(self.row()))
         self.assertFalse(is_good(self.row(collisions=1)))

@@ -40,19 +40,24 @@ def row_of(mission, folder, error, commit):
     return row
 
 
+def _without_cut_row(path):
+    """The text of a file up to its last whole line; empty if there is no file."""
+    text = path.read_text(encoding="utf-8") if path.exists() else ""
+    return text[: text.rfind("\n") + 1]
+
+
 def read_rows(path):
     """{key: row} of a file, empty if there is none. A last row cut short is left out."""
-    if not path.exists():
-        return {}
-    with path.open(encoding="utf-8", newline="") as lines:
-        rows = [row for row in csv.DictReader(lines) if None not in row.values()]
+    rows = csv.DictReader(_without_cut_row(path).splitlines())
     return {tuple(row[name] for name in KEY): row for row in rows}
 
 
 def append_row(path, row):
-    """Adds one row, with a header if it is the first."""
-    is_new = not path.exists()
+    """Adds one row, with a header if it is the first. A last row cut short is dropped."""
+    whole = _without_cut_row(path)
+    is_new = not whole
     with path.open("a", encoding="utf-8", newline="") as lines:
+        lines.truncate(len(whole.encode("utf-8")))
         writer = csv.DictWriter(lines, COLUMNS, lineterminator="\n")
         if is_new:
             writer.writeheader()
