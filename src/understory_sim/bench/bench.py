@@ -62,9 +62,10 @@ class Bench:
         self.keep_folders = keep_folders
         self.commit = os.environ.get("UNDERSTORY_COMMIT", "unknown")
         self.interrupted = threading.Event()
+        self.writing = threading.Lock()
 
     def fly(self, mission):
-        """The row of one mission; none if the bench was interrupted."""
+        """The row of one mission, written at once; none if the bench was interrupted."""
         if self.interrupted.is_set():
             return None
         out = self.folder / "missions" / mission.name
@@ -79,12 +80,14 @@ class Bench:
         row = row_of(mission, out, said[0] if done.returncode == 2 and said else "", self.commit)
         if row["stop_reason"] == "interrupted":
             return None
+        with self.writing:
+            append_row(self.csv, row)
         if not self.keep_folders and is_good(row):
             shutil.rmtree(out, ignore_errors=True)
         return row
 
     def fly_all(self, missions, jobs):
-        """Flies them and shows how far it is; every row is written as soon as it is there."""
+        """Flies them and shows how far it is; true if it was not interrupted."""
         began = time.monotonic()
         good = 0
         with concurrent.futures.ThreadPoolExecutor(jobs) as pool:
@@ -94,7 +97,6 @@ class Bench:
                     row = flight.result()
                     if row is None:
                         continue
-                    append_row(self.csv, row)
                     good += is_good(row)
                     self.show(row, done, len(missions), good, time.monotonic() - began)
             except KeyboardInterrupt:
