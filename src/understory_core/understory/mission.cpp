@@ -20,6 +20,10 @@ constexpr double kHeadroomM = 0.5;
 
 const char* to_string(MissionState state) {
   switch (state) {
+    case MissionState::kWaiting:
+      return "waiting";
+    case MissionState::kPaused:
+      return "paused";
     case MissionState::kTakeOff:
       return "take_off";
     case MissionState::kExplore:
@@ -48,6 +52,12 @@ const char* to_string(StopReason reason) {
       return "interrupted";
     case StopReason::kTakeOffFailed:
       return "take_off_failed";
+    case StopReason::kReturnRequested:
+      return "return_requested";
+    case StopReason::kLandRequested:
+      return "land_requested";
+    case StopReason::kSensorLost:
+      return "sensor_lost";
   }
   return "?";
 }
@@ -64,7 +74,9 @@ Mission::Mission(const MissionConfig& config,
       pilot_(explorer.plan, duration_from_seconds(explorer.replan.lead_s)),
       explorer_(explorer, geometry),
       home_m_(home_m),
-      home_yaw_rad_(yaw_rad) {
+      home_yaw_rad_(yaw_rad),
+      state_(config.auto_start ? MissionState::kTakeOff : MissionState::kWaiting),
+      started_at_(now) {
   if (!geometry.box_m().contains(home_m)) {
     throw ConfigError("start: lies outside the exploration box");
   }
@@ -89,15 +101,80 @@ void Mission::end_exploration(StopReason reason, Time now) {
                                                                      : MissionState::kStopped;
 }
 
-void Mission::stop(StopReason reason, Time now) {
-  if (!pilot_.is_at_rest(now)) {
-    // Without a braking trajectory the flown one stands, which ends at rest as well.
-    static_cast<void>(pilot_.brake(now).has_value());
+// Null where the vehicle rests, or where there is no braking trajectory: then the flown one stands,
+// which ends at rest as well.
+TrajectoryPtr Mission::brake_if(bool is_needed, Time now) {
+  if (!is_needed || pilot_.is_at_rest(now)) {
+    return nullptr;
   }
+  const Result<TrajectoryPtr, PlanError> braked = pilot_.brake(now);
+  return braked ? *braked : nullptr;
+}
+
+TrajectoryPtr Mission::stop(StopReason reason, Time now) {
+  TrajectoryPtr braking = brake_if(true, now);
   if (reason_ == StopReason::kNone) {
     end_exploration(reason, now);
   }
   state_ = MissionState::kStopped;
+  return braking;
+}
+
+bool Mission::start(Time now) {
+  if (state_ == MissionState::kWaiting) {
+    started_at_ = now;
+    state_ = MissionState::kTakeOff;
+    return true;
+  }
+  if (state_ == MissionState::kPaused) {
+    state_ = resumed_state_;
+    return true;
+  }
+  return false;
+}
+
+Mission::Answer Mission::pause(Time now) {
+  const bool is_pausable = state_ == MissionState::kTakeOff || state_ == MissionState::kExplore ||
+                           state_ == MissionState::kReturnHome || state_ == MissionState::kDescend;
+  if (!is_pausable) {
+    return {};
+  }
+  resumed_state_ = state_;
+  state_ = MissionState::kPaused;
+  return {true, brake_if(true, now)};
+}
+
+Mission::Answer Mission::return_home(Time now) {
+  if (is_over() || state_ == MissionState::kWaiting) {
+    return {};
+  }
+  if (reason_ == StopReason::kNone) {
+    end_exploration(StopReason::kReturnRequested, now);
+  }
+  failed_legs_ = 0;
+  state_ = MissionState::kReturnHome;
+  return {true, nullptr};  // the way home begins on what is flown
+}
+
+Mission::Answer Mission::land(Time now) {
+  if (is_over() || state_ == MissionState::kWaiting) {
+    return {};
+  }
+  if (reason_ == StopReason::kNone) {
+    end_exploration(StopReason::kLandRequested, now);
+  }
+  failed_legs_ = 0;
+  state_ = MissionState::kDescend;
+  return {true, brake_if(true, now)};
+}
+
+void Mission::withdraw(const TrajectoryPtr& trajectory) {
+  pilot_.withdraw(trajectory);
+}
+
+// In these states nobody else checks what is being flown against the newest map.
+bool Mission::is_flying_unwatched() const {
+  return state_ != MissionState::kExplore && state_ != MissionState::kReturnHome;
 }
 
 // Straight there; null and counted when there is no checked trajectory.
@@ -147,8 +224,8 @@ TrajectoryPtr Mission::explore(const ExploreStep& step, Time now) {
 
 // From home there may be a way to what could not be reached from where the exploration ended.
 void Mission::resume_at_home() {
-  if (state_ == MissionState::kDescend && explorer_.has_open_clusters() &&
-      resumptions_ < kMaxResumptions) {
+  if (state_ == MissionState::kDescend && reason_ == StopReason::kNothingLeft &&
+      explorer_.has_open_clusters() && resumptions_ < kMaxResumptions) {
     ++resumptions_;
     reason_ = StopReason::kNone;
     state_ = MissionState::kExplore;
@@ -215,10 +292,19 @@ MissionStep Mission::on_map(const MapSnapshotPtr& snapshot, Time now) {
   MissionStep step;
   pilot_.update_map(snapshot);
   explorer_.observe(snapshot);
-  if (reason_ == StopReason::kNone && to_seconds(now) >= config_.time_limit_s) {
-    stop(StopReason::kTimeLimit, now);
+  const bool is_late = to_seconds(now - started_at_) >= config_.time_limit_s;
+  if (reason_ == StopReason::kNone && state_ != MissionState::kWaiting && is_late) {
+    step.published = stop(StopReason::kTimeLimit, now);
+    return step;
+  }
+  if (is_flying_unwatched() && !pilot_.is_at_rest(now) && pilot_.unsafe_from(now)) {
+    step.published = brake_if(true, now);
+    return step;
   }
   switch (state_) {
+    case MissionState::kWaiting:
+    case MissionState::kPaused:
+      break;
     case MissionState::kTakeOff:
       step.published = climb(now);
       break;

@@ -1,10 +1,10 @@
 // Copyright 2026 the Understory authors
 // SPDX-License-Identifier: BSD-3-Clause
 //
-// The mission around the exploration: take off, explore until nothing is left, return home, land.
-// World frame, SI units. Called with every map update, on one thread; deterministic; nothing throws
-// in flight. Every phase is bounded: what cannot be flown after a number of tries ends the mission
-// where the vehicle is, at rest in known free space.
+// The mission around the exploration: take off, explore until nothing is left, return home, land;
+// and what an operator may ask for in between. World frame, SI units. Called with every map update,
+// on one thread; deterministic; nothing throws in flight. Every phase is bounded: what cannot be
+// flown after a number of tries ends the mission where the vehicle is, at rest in known free space.
 #pragma once
 
 #include <cstdint>
@@ -18,6 +18,7 @@ struct MissionConfig {
   double launch_site_radius_m = 0.7;
   double time_limit_s = 1500.0;
   bool return_home = true;
+  bool auto_start = true;
 
   void visit(FieldVisitor& f) {
     f.field("take_off_height_m",
@@ -30,10 +31,13 @@ struct MissionConfig {
             "the operator vouches that this much around the start is free, up to take-off height");
     f.field("time_limit_s", time_limit_s, in_range(1.0, 1e6), "then the vehicle stops where it is");
     f.field("return_home", return_home, "fly back to the start and land when nothing is left");
+    f.field("auto_start", auto_start, "false: the vehicle stays where it is until told to start");
   }
 };
 
 enum class MissionState : std::uint8_t {
+  kWaiting,
+  kPaused,
   kTakeOff,
   kExplore,
   kReturnHome,
@@ -49,6 +53,9 @@ enum class StopReason : std::uint8_t {
   kTimeLimit,
   kInterrupted,
   kTakeOffFailed,
+  kReturnRequested,
+  kLandRequested,
+  kSensorLost,
 };
 [[nodiscard]] const char* to_string(StopReason reason);
 
@@ -72,7 +79,21 @@ class Mission {
 
   MissionStep on_map(const MapSnapshotPtr& snapshot, Time now);
   // Brakes, and stays where it is.
-  void stop(StopReason reason, Time now);
+  TrajectoryPtr stop(StopReason reason, Time now);
+
+  // What an operator asks for. False: not now (start: it flies already; the others: it is over).
+  // A trajectory is handed out where the vehicle must brake first.
+  bool start(Time now);
+  struct Answer {
+    bool accepted = false;
+    TrajectoryPtr published;
+  };
+  Answer pause(Time now);
+  Answer return_home(Time now);
+  Answer land(Time now);
+
+  // The host could not hand this trajectory out in time: what was flown before is flown on.
+  void withdraw(const TrajectoryPtr& trajectory);
 
   [[nodiscard]] MissionState state() const { return state_; }
   // kLand: the autopilot sets the vehicle down; kStopped: it hovers. Nothing more will be planned.
@@ -80,12 +101,15 @@ class Mission {
     return state_ == MissionState::kLand || state_ == MissionState::kStopped;
   }
   [[nodiscard]] StopReason stop_reason() const { return reason_; }
+  [[nodiscard]] Time started_at() const { return started_at_; }
   // When exploration ended; meaningful once a stop reason is set.
   [[nodiscard]] Time explored_at() const { return explored_at_; }
   [[nodiscard]] const Pilot& pilot() const { return pilot_; }
   [[nodiscard]] const Explorer& explorer() const { return explorer_; }
 
  private:
+  [[nodiscard]] bool is_flying_unwatched() const;
+  TrajectoryPtr brake_if(bool is_needed, Time now);
   void end_exploration(StopReason reason, Time now);
   TrajectoryPtr climb(Time now);
   TrajectoryPtr explore(const ExploreStep& step, Time now);
@@ -100,8 +124,10 @@ class Mission {
   Explorer explorer_;
   Vector3d home_m_;
   double home_yaw_rad_;
-  MissionState state_ = MissionState::kTakeOff;
+  MissionState state_;
+  MissionState resumed_state_ = MissionState::kTakeOff;  // what follows on a pause
   StopReason reason_ = StopReason::kNone;
+  Time started_at_;
   Time explored_at_{};
   bool has_explored_ = true;  // since explored_at_ was set
   std::optional<Time> nothing_left_since_;

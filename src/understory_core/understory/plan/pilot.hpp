@@ -52,6 +52,8 @@ class Pilot {
 
   Result<TrajectoryPtr, PlanError> fly(const FlightGoal& goal, Time now);
   Result<TrajectoryPtr, PlanError> brake(Time now);
+  // As if it had never been handed out: what was flown before holds on.
+  void withdraw(const TrajectoryPtr& trajectory) { follower_.remove(trajectory); }
 
   [[nodiscard]] const TrajectoryFollower& follower() const { return follower_; }
   [[nodiscard]] bool is_at_rest(Time now) const { return now >= follower_.newest()->end(); }

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "understory/plan/trajectory_follower.hpp"
 
+#include <algorithm>
 #include <cassert>
 
 namespace understory {
@@ -14,6 +15,12 @@ void TrajectoryFollower::set(TrajectoryPtr trajectory, Time now) {
     queue_.erase(queue_.begin());
   }
   queue_.push_back(std::move(trajectory));
+}
+
+void TrajectoryFollower::remove(const TrajectoryPtr& trajectory) {
+  if (queue_.size() > 1) {
+    queue_.erase(std::remove(queue_.begin(), queue_.end(), trajectory), queue_.end());
+  }
 }
 
 const Trajectory& TrajectoryFollower::at(Time time) const {

@@ -15,6 +15,8 @@ class TrajectoryFollower {
  public:
   // Whatever was to take over at or after the new one's start is dropped.
   void set(TrajectoryPtr trajectory, Time now);
+  // Takes it back; the only one there is stays.
+  void remove(const TrajectoryPtr& trajectory);
 
   [[nodiscard]] bool empty() const { return queue_.empty(); }
   [[nodiscard]] const Trajectory& at(Time time) const;

@@ -8,10 +8,10 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <string>
 
 #include "understory/sim/lockstep.hpp"
-#include "understory/sim/result_writer.hpp"
-#include "understory/sim/scorer.hpp"
+#include "understory/sim/mission_record.hpp"
 #include "understory/sim/stage_times.hpp"
 
 namespace understory {
@@ -24,7 +24,7 @@ struct RunSetup {
 
 class MissionRun {
  public:
-  explicit MissionRun(RunSetup setup);
+  explicit MissionRun(const RunSetup& setup);
 
   // Until the vehicle is down, or until `interrupted` says so; then it is brought to rest first.
   // `on_frame` sees every camera frame.
@@ -33,22 +33,17 @@ class MissionRun {
 
   [[nodiscard]] MissionResult result() const;
   [[nodiscard]] const MapSnapshot& map() const { return *map_; }
-  [[nodiscard]] const Forest& forest() const { return truth_->forest(); }
-  [[nodiscard]] const SimulationConfig& config() const { return setup_.config; }
+  [[nodiscard]] const Forest& forest() const { return world_.truth->forest(); }
+  [[nodiscard]] const SimulationConfig& config() const { return world_.config; }
   [[nodiscard]] double realtime_factor() const;
+  void write(const std::string& folder) const { record_.write(folder, *map_, result()); }
 
  private:
-  [[nodiscard]] TickRow tick(const LockstepFrame& frame);
-
-  RunSetup setup_;
-  Rng rng_;
-  std::shared_ptr<const ForestTruth> truth_;
+  World world_;
   StageTimes times_;
-  std::unique_ptr<Scorer> scorer_;
+  MissionRecord record_;
   std::unique_ptr<Lockstep> lockstep_;
   MapSnapshotPtr map_;
-  std::map<std::string, double> mode_frames_;
-  double flown_frames_ = 0.0;
   std::chrono::nanoseconds wall_{0};
 };
 

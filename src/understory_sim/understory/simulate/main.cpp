@@ -13,8 +13,8 @@
 #include <unistd.h>
 
 #include "understory/map/octomap_io.hpp"
+#include "understory/sim/live_line.hpp"
 #include "understory/sim/mission_run.hpp"
-#include "understory/simulate/live_line.hpp"
 #include "understory/simulate/options.hpp"
 
 namespace understory {
@@ -69,37 +69,9 @@ bool make_report(const std::string& folder) {
          WEXITSTATUS(status) == 0;
 }
 
-void write_folder(const std::string& folder, const MissionRun& run) {
-  const fs::path path(folder);
-  MissionResult result = run.result();
-  const char* commit = std::getenv("UNDERSTORY_COMMIT");
-  result.commit = commit == nullptr ? "" : commit;
-  write_text_file((path / "config.yaml").string(), to_yaml(run.config()));
-  write_trunks((path / "trunks.csv").string(), run.forest().trunks, run.config().scene.box.box_m());
-  result.topview = write_topview(run.map(), (path / "topview.pgm").string());
-  write_result_json((path / "result.json").string(), result);
-  save_octomap(run.map(), (path / "map.ot").string());
-}
-
-std::string summary(const MissionResult& result) {
-  return fmt::format(
-      "{} after {:.1f} s ({}): coverage {:.2f} %, {:.0f} m at {:.2f} m/s, {} collisions, clearance "
-      "{:.2f} m, x{:.0f} real time, {:.0f} MB",
-      result.completed ? "completed" : "NOT completed",
-      result.completion_time_s.value_or(result.mission_time_s),
-      result.stop_reason,
-      100.0 * result.coverage,
-      result.distance_m,
-      result.speed_mean_mps,
-      result.collisions,
-      result.min_clearance_m.value_or(0.0),
-      result.realtime_factor,
-      result.peak_rss_mb);
-}
-
 int fly_one(const Options& options) {
   RunSetup setup;
-  setup.config = load_simulation_config(options);
+  setup.config = load_scenario((fs::path(project_root()) / "config").string(), options.choice);
   setup.seed = options.seed;
   const std::string folder =
       !options.out_dir.empty()
@@ -112,7 +84,7 @@ int fly_one(const Options& options) {
   }
   prepare_result_folder(folder);
   catch_signals();
-  MissionRun run(std::move(setup));
+  MissionRun run(setup);
   TickWriter ticks((fs::path(folder) / "ticks.csv").string());
   LiveLine live(options.quiet);
   TickRow last;
@@ -124,9 +96,9 @@ int fly_one(const Options& options) {
           });
   live.finish(last, run.realtime_factor());
   ticks.close();
-  write_folder(folder, run);
+  run.write(folder);
   const MissionResult result = run.result();
-  fmt::print("{}\n", summary(result));
+  fmt::print("{}\n", summary_of(result));
   const bool has_report = !options.no_report && make_report(folder);
   fmt::print("{}: {}\n",
              has_report ? "report" : "results",

@@ -1,6 +1,6 @@
 // Copyright 2026 the Understory authors
 // SPDX-License-Identifier: BSD-3-Clause
-#include "understory/simulate/live_line.hpp"
+#include "understory/sim/live_line.hpp"
 
 #include <cstdio>
 
