@@ -1,10 +1,11 @@
 #!/usr/bin/python3
 # Copyright 2026 the Understory authors
 # SPDX-License-Identifier: BSD-3-Clause
-"""Latency of a run: reading its trace, and the statistics."""
+"""Latency of a run: reading its trace, the statistics, and the file for Perfetto."""
 
 import csv
 import io
+import json
 import pathlib
 import random
 import sys
@@ -12,7 +13,7 @@ import time
 import unittest
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "support"))
-from latency_traces import HEADER, TraceFolder, frame, row, wakeups  # noqa: E402
+from latency_traces import HEADER, WHOLE_FRAME, TraceFolder, frame, row, wakeups  # noqa: E402
 from latency_rows import (  # noqa: E402
     KNOWN_ROWS,
     Statistics,
@@ -22,6 +23,7 @@ from latency_rows import (  # noqa: E402
     samples_of,
     statistics_of,
 )
+from trace_events import lanes_of, trace_event_json  # noqa: E402
 from trace_file import STAGES, TraceError, read_trace  # noqa: E402
 
 
@@ -236,6 +238,67 @@ class Rows(TraceFolder):
         self.assertEqual([row["stage"] for row in rows], list(KNOWN_ROWS))
         self.assertEqual(list(rows[2].values())[:4], ["map", "2", "6.500000", "6.500000"])
         self.assertEqual(set(list(rows[6].values())[2:]), {""})  # no wakeup was marked
+
+
+class TraceEvents(TraceFolder):
+    """The file for Perfetto."""
+
+    def events(self, rows):
+        document = json.loads(trace_event_json(self.trace(rows)))
+        tracks = {
+            event["tid"]: event["args"]["name"]
+            for event in document["traceEvents"]
+            if event["name"] == "thread_name"
+        }
+        complete = [event for event in document["traceEvents"] if event["ph"] == "X"]
+        return tracks, complete
+
+    def test_durations_and_times_are_microseconds_since_the_first_mark(self):
+        _, events = self.events(frame(5) + row("wakeup", None, 2, 2.001034))
+
+        found = {event["name"]: (event["ts"], event["dur"]) for event in events}
+        self.assertEqual(found["wakeup"], (0.0, 1.034))
+        self.assertEqual(found["camera"], (3000.0, 10000.0))
+        self.assertEqual(found["map"], (16500.0, 6500.0))
+        self.assertEqual(len(events), len(WHOLE_FRAME) + 1)
+
+    def test_each_stage_has_a_track_of_its_name(self):
+        tracks, events = self.events(frame(0) + frame(33) + wakeups([1, 1]))
+
+        self.assertEqual(list(tracks.values()), [*WHOLE_FRAME, "wakeup"])
+        self.assertNotIn(0, tracks)
+        for event in events:
+            self.assertEqual(tracks[event["tid"]], event["name"])
+
+    def test_events_of_a_frame_have_its_number_and_others_none(self):
+        _, events = self.events(frame(33, ["map"]) + frame(0, ["camera"]) + wakeups([1]))
+
+        found = {event["name"]: event["args"] for event in events}
+        self.assertEqual(found, {"camera": {"frame": 0}, "map": {"frame": 1}, "wakeup": {}})
+
+    def test_events_of_a_track_never_overlap(self):
+        generator = random.Random(3)
+        late_ms = [generator.choice([0.1, 15, 35]) for _ in range(200)]
+        tracks, events = self.events(wakeups(late_ms))
+
+        self.assertEqual(len(events), 200)
+        self.assertEqual(
+            list(tracks.values()), ["wakeup", "wakeup (2)", "wakeup (3)", "wakeup (4)"]
+        )
+        free = dict.fromkeys(tracks, 0.0)
+        for event in sorted(events, key=lambda event: event["ts"]):
+            self.assertGreaterEqual(event["ts"], free[event["tid"]])
+            free[event["tid"]] = event["ts"] + event["dur"]
+
+    def test_one_after_the_other_takes_one_lane(self):
+        trace = self.trace("".join(row("map", at, at, at + 10) for at in range(0, 100, 10)))
+
+        self.assertEqual(set(lanes_of(trace.stages["map"])), {0})
+
+    def test_an_event_that_ends_before_it_begins_has_no_duration(self):
+        _, events = self.events(frame(0, ["camera"], setpoint=(26, 25)))
+
+        self.assertEqual([event["dur"] for event in events], [10000.0, 0.0])
 
 
 if __name__ == "__main__":
