@@ -1,7 +1,7 @@
 #!/usr/bin/python3
 # Copyright 2026 the Understory authors
 # SPDX-License-Identifier: BSD-3-Clause
-"""Latency of a run: reading its trace, the statistics, and the file for Perfetto."""
+"""Latency of a run: reading its trace, the statistics, the file for Perfetto, and budgets."""
 
 import csv
 import io
@@ -13,7 +13,8 @@ import time
 import unittest
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "support"))
-from latency_traces import HEADER, WHOLE_FRAME, TraceFolder, frame, row, wakeups  # noqa: E402
+from latency_traces import HEADER, ROOT, WHOLE_FRAME, TraceFolder, frame, row, wakeups  # noqa: E402
+from budget_file import BudgetError, excesses, read_budget  # noqa: E402
 from latency_rows import (  # noqa: E402
     KNOWN_ROWS,
     Statistics,
@@ -299,6 +300,68 @@ class TraceEvents(TraceFolder):
         _, events = self.events(frame(0, ["camera"], setpoint=(26, 25)))
 
         self.assertEqual([event["dur"] for event in events], [10000.0, 0.0])
+
+
+class BudgetFile(TraceFolder):
+    """Limits: what is over, and what is no budget."""
+
+    def budget(self, text):
+        return read_budget(self.write("budget.yaml", text), KNOWN_ROWS)
+
+    def found(self, budget, lateness_ms):
+        return excesses(self.budget(budget), statistics_of(self.trace(wakeups(lateness_ms))))
+
+    def test_only_what_is_above_its_limit_is_over(self):
+        hundred = list(range(1, 101))
+        for limits, over in (
+            ("{p99_ms: 99}", []),
+            ("{p99_ms: 98.9}", ["p99_ms"]),
+            ("{p50_ms: 49, p90_ms: 90, max_ms: 99}", ["p50_ms", "max_ms"]),
+            ("{mean_ms: 50.5}", []),
+            ("{mean_ms: 50.4}", ["mean_ms"]),
+        ):
+            with self.subTest(limits=limits):
+                lines = self.found(f"wakeup: {limits}\n", hundred)
+
+                self.assertEqual([line.split()[1] for line in lines], over)
+                self.assertTrue(all(line.startswith("wakeup: ") for line in lines))
+
+    def test_a_row_without_samples_is_over(self):
+        found = self.found("wakeup: {max_ms: 1000}\nmap: {p99_ms: 1000}\n", [1])
+
+        self.assertEqual(found, ["map: no samples"])
+
+    def test_bad_budgets_are_refused_with_file_and_key(self):
+        for content, key in (
+            ("wakupe: {p99_ms: 1}\n", "wakupe: unknown stage"),
+            ("3: {p99_ms: 1}\n", "3: unknown stage"),
+            ("wakeup: {p95_ms: 1}\n", "wakeup.p95_ms: unknown key"),
+            ("wakeup: {count: 1}\n", "wakeup.count: unknown key"),
+            ("wakeup: {p99_ms: soon}\n", "wakeup.p99_ms: expected milliseconds"),
+            ("wakeup: {p99_ms: true}\n", "wakeup.p99_ms: expected milliseconds"),
+            ("wakeup: {p99_ms: -1}\n", "wakeup.p99_ms: expected milliseconds"),
+            ("wakeup: {p99_ms: .nan}\n", "wakeup.p99_ms: expected milliseconds"),
+            ("wakeup: {p99_ms: .inf}\n", "wakeup.p99_ms: expected milliseconds"),
+            ("wakeup: 20\n", "wakeup: expected limits"),
+            ("wakeup: {}\n", "wakeup: expected limits"),
+            ("map: {p99_ms: 1}\nmap: {max_ms: 1}\n", "map: given twice"),
+            ("", "expected stages"),
+            ("- wakeup\n", "expected stages"),
+            ("wakeup: [\n", "not YAML"),
+            ("[a]: {p99_ms: 1}\n", "not YAML"),
+        ):
+            with self.subTest(content=content):
+                with self.assertRaises(BudgetError) as caught:
+                    self.budget(content)
+
+                self.assertIn(f"{self.folder / 'budget.yaml'}: {key}", str(caught.exception))
+                self.assertNotIn("\n", str(caught.exception))
+
+    def test_our_budget_is_one(self):
+        budget = read_budget(ROOT / "config" / "latency_budget.yaml", KNOWN_ROWS)
+
+        self.assertIn("exposure_to_trajectory", budget)
+        self.assertIn("wakeup", budget)
 
 
 if __name__ == "__main__":
