@@ -1,0 +1,218 @@
+// Copyright 2026 the Understory authors
+// SPDX-License-Identifier: BSD-3-Clause
+#include "understory/bridge/flight_loop.hpp"
+
+#include <algorithm>
+#include <cerrno>
+#include <ctime>
+
+#include <boost/lockfree/spsc_queue.hpp>
+#include <pthread.h>
+#include <sched.h>
+#include <semaphore.h>
+
+namespace understory {
+namespace {
+
+constexpr std::int64_t kNanoseconds = 1'000'000'000;
+constexpr std::size_t kPlansInFlight = 64;
+constexpr std::size_t kTicksInFlight = 256;
+
+timespec to_timespec(std::int64_t nanoseconds) {
+  return {static_cast<time_t>(nanoseconds / kNanoseconds),
+          static_cast<long>(nanoseconds % kNanoseconds)};
+}
+
+std::int64_t now_ns(clockid_t clock) {
+  timespec time{};
+  clock_gettime(clock, &time);
+  return time.tv_sec * kNanoseconds + time.tv_nsec;
+}
+
+Setpoint to_setpoint(const TrajectoryPoint& point) {
+  return {point.position_m,
+          point.velocity_mps,
+          point.acceleration_mps2,
+          point.yaw_rad,
+          point.yaw_rate_radps};
+}
+
+Setpoint hold_at(const VehicleState& state) {
+  Setpoint hold;
+  hold.position_m = state.position_m;
+  hold.yaw_rad = yaw_of(state.world_from_body);
+  return hold;
+}
+
+class Semaphore {
+ public:
+  Semaphore() { sem_init(&semaphore_, 0, 0); }
+  Semaphore(const Semaphore&) = delete;
+  Semaphore& operator=(const Semaphore&) = delete;
+  ~Semaphore() { sem_destroy(&semaphore_); }
+
+  void post() { sem_post(&semaphore_); }
+  bool wait(std::chrono::milliseconds at_most) {
+    const timespec until =
+        to_timespec(now_ns(CLOCK_MONOTONIC) + std::chrono::nanoseconds(at_most).count());
+    int status = 0;
+    do {
+      status = sem_clockwait(&semaphore_, CLOCK_MONOTONIC, &until);
+    } while (status != 0 && errno == EINTR);
+    return status == 0;
+  }
+
+ private:
+  sem_t semaphore_{};
+};
+
+}  // namespace
+
+Time wall_time() {
+  return Time(Duration(now_ns(CLOCK_REALTIME) / 1000));
+}
+
+std::int64_t steady_ns() {
+  return now_ns(CLOCK_MONOTONIC);
+}
+
+using Plan = std::shared_ptr<const TrajectoryFollower>;
+
+// One writer and one reader each. Plans come back to the thread that made them, because freeing
+// memory is not for the flight thread.
+struct FlightLoop::Mailboxes {
+  boost::lockfree::spsc_queue<Plan, boost::lockfree::capacity<kPlansInFlight>> to_fly;
+  boost::lockfree::spsc_queue<Plan, boost::lockfree::capacity<2 * kPlansInFlight>> flown;
+  boost::lockfree::spsc_queue<FlightTick, boost::lockfree::capacity<kTicksInFlight>> ticks;
+  Semaphore tick_arrived;
+
+  // Of the flight thread.
+  Plan plan;
+  std::uint64_t sent_id = 0;
+  Setpoint hold;
+  bool has_hold = false;
+  bool has_landed_autopilot = false;
+};
+
+FlightLoop::FlightLoop(const FlightConfig& config,
+                       const Box3d& box_m,
+                       std::unique_ptr<Autopilot> autopilot)
+    : config_(config),
+      gate_(config.gate, box_m),
+      autopilot_(std::move(autopilot)),
+      mailboxes_(std::make_unique<Mailboxes>()) {
+  thread_ = std::thread([this] { run(); });
+}
+
+FlightLoop::~FlightLoop() {
+  is_stopping_ = true;
+  thread_.join();
+}
+
+void FlightLoop::offer(const TrajectoryPtr& trajectory, Time now) {
+  Plan freed;
+  while (mailboxes_->flown.pop(freed)) {
+  }
+  follower_.set(trajectory, now);
+  while (!mailboxes_->to_fly.push(std::make_shared<const TrajectoryFollower>(follower_))) {
+    std::this_thread::yield();  // full only if the flight thread has not run for many decisions
+  }
+  is_at_rest_ = false;  // until a turn has seen it
+}
+
+void FlightLoop::land() {
+  is_landing_ = true;
+}
+
+void FlightLoop::settle(std::chrono::milliseconds at_most) const {
+  const auto until = std::chrono::steady_clock::now() + at_most;
+  while (!is_at_rest_ && std::chrono::steady_clock::now() < until) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  }
+}
+
+std::optional<FlightTick> FlightLoop::wait_for_tick(std::chrono::milliseconds at_most) {
+  FlightTick tick;
+  if (!mailboxes_->tick_arrived.wait(at_most) || !mailboxes_->ticks.pop(tick)) {
+    return std::nullopt;
+  }
+  return tick;
+}
+
+bool FlightLoop::become_real_time() const {
+  pthread_setname_np(pthread_self(), "flight");
+  sched_param parameter{};
+  parameter.sched_priority = config_.priority;
+  return config_.priority > 0 && pthread_setschedparam(pthread_self(), SCHED_FIFO, &parameter) == 0;
+}
+
+void FlightLoop::turn(FlightTick& tick) {
+  Mailboxes& boxes = *mailboxes_;
+  Plan next;
+  while (boxes.to_fly.pop(next)) {
+    if (boxes.plan) {
+      static_cast<void>(boxes.flown.push(boxes.plan));  // twice the room of what can be under way
+    }
+    boxes.plan.swap(next);
+    next.reset();
+  }
+  const Time now = wall_time();
+  if (boxes.plan) {
+    const Trajectory& flown = boxes.plan->at(now);
+    tick.setpoint = gate_.pass(to_setpoint(flown.sample(now)), now);
+    tick.trajectory_id = flown.id;
+    tick.depth_stamp = flown.depth_stamp;
+    tick.is_at_rest = now >= boxes.plan->newest()->end();
+    tick.is_first_of_trajectory = flown.id != boxes.sent_id;
+    boxes.sent_id = flown.id;
+  } else {
+    if (!boxes.has_hold) {
+      boxes.hold = hold_at(autopilot_->receive(now).state);
+      boxes.has_hold = true;
+    }
+    tick.setpoint = gate_.pass(boxes.hold, now);
+  }
+  if (is_landing_ && !boxes.has_landed_autopilot) {
+    autopilot_->land();
+    boxes.has_landed_autopilot = true;
+  }
+  autopilot_->send(tick.setpoint, now);
+  tick.sent_ns = steady_ns();
+  tick.telemetry = autopilot_->receive(now);
+  tick.gate_violations = gate_.violations();
+  // Not while a plan waits that this turn has not seen.
+  is_at_rest_ = tick.is_at_rest && boxes.to_fly.read_available() == 0;
+}
+
+void FlightLoop::run() {
+  is_real_time_ = become_real_time();
+  const auto period_ns =
+      static_cast<std::int64_t>(static_cast<double>(kNanoseconds) / config_.rate_hz);
+  std::int64_t due_ns = steady_ns() + period_ns;
+  std::uint64_t skipped = 0;
+  while (!is_stopping_) {
+    const timespec until = to_timespec(due_ns);
+    while (clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &until, nullptr) == EINTR) {
+    }
+    FlightTick tick;
+    tick.due_ns = due_ns;
+    tick.woken_ns = steady_ns();
+    tick.skipped_deadlines = skipped;
+    turn(tick);
+    if (mailboxes_->ticks.push(tick)) {
+      mailboxes_->tick_arrived.post();
+    } else {
+      ++lost_ticks_;
+    }
+    due_ns += period_ns;
+    // After a long stall the missed setpoints are not made up for: the next one is due from now.
+    const std::int64_t behind_ns = steady_ns() - due_ns;
+    if (behind_ns > 0) {
+      const std::int64_t missed = behind_ns / period_ns + 1;
+      skipped += static_cast<std::uint64_t>(missed);
+      due_ns += missed * period_ns;
+    }
+  }
+}
+
+}  // namespace understory
