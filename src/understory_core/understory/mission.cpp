@@ -58,8 +58,17 @@ const char* to_string(StopReason reason) {
       return "land_requested";
     case StopReason::kSensorLost:
       return "sensor_lost";
+    case StopReason::kStageFailed:
+      return "stage_failed";
   }
   return "?";
+}
+
+Box3d launch_site_m(const MissionConfig& config, const Vector3d& home_m) {
+  const double radius_m = config.launch_site_radius_m;
+  const double top_m = std::max(config.take_off_height_m, home_m.z()) + kHeadroomM;
+  return {home_m - Vector3d(radius_m, radius_m, home_m.z()),
+          Vector3d(home_m.x() + radius_m, home_m.y() + radius_m, top_m)};
 }
 
 // NOLINTNEXTLINE(readability-function-size): all that a mission starts from, once
@@ -81,13 +90,6 @@ Mission::Mission(const MissionConfig& config,
     throw ConfigError("start: lies outside the exploration box");
   }
   pilot_.take_position(home_m, yaw_rad, now);
-}
-
-Box3d Mission::launch_site_m() const {
-  const double radius_m = config_.launch_site_radius_m;
-  const double top_m = std::max(config_.take_off_height_m, home_m_.z()) + kHeadroomM;
-  return {home_m_ - Vector3d(radius_m, radius_m, home_m_.z()),
-          Vector3d(home_m_.x() + radius_m, home_m_.y() + radius_m, top_m)};
 }
 
 void Mission::end_exploration(StopReason reason, Time now) {

@@ -56,8 +56,12 @@ enum class StopReason : std::uint8_t {
   kReturnRequested,
   kLandRequested,
   kSensorLost,
+  kStageFailed,
 };
 [[nodiscard]] const char* to_string(StopReason reason);
+
+// What the operator vouches for; to be marked free in the map before the first update.
+[[nodiscard]] Box3d launch_site_m(const MissionConfig& config, const Vector3d& home_m);
 
 struct MissionStep {
   ExploreStep explore;
@@ -73,9 +77,6 @@ class Mission {
           const Vector3d& home_m,
           double yaw_rad,
           Time now);
-
-  // To be marked free in the map before the first update.
-  [[nodiscard]] Box3d launch_site_m() const;
 
   MissionStep on_map(const MapSnapshotPtr& snapshot, Time now);
   // Brakes, and stays where it is.

@@ -176,20 +176,29 @@ std::string header(const MapSnapshot& map, Encoding encoding, std::size_t node_c
          shortest(map.geometry.resolution_m()) + "\ndata\n";
 }
 
+void require_representable(const MapSnapshot& map, const std::string& name) {
+  const VoxelBox& voxels = map.geometry.voxels();
+  if ((voxels.min.array() < -octomap_format::kKeyOrigin).any() ||
+      (voxels.end.array() > octomap_format::kKeyOrigin).any()) {
+    throw MapFileError(name +
+                       ": the box reaches beyond the 32768 voxels from the origin that an "
+                       "OctoMap can hold");
+  }
+}
+
 }  // namespace
+
+std::string octomap_tree(const MapSnapshot& map, bool is_binary) {
+  require_representable(map, "octomap");
+  return TreeEncoder(map, is_binary ? Encoding::kMaximumLikelihood : Encoding::kLogOdds).bytes();
+}
 
 void save_octomap(const MapSnapshot& map, const std::string& path) {
   const std::optional<Encoding> encoding = octomap_format::encoding_of(path);
   if (!encoding) {
     throw MapFileError(path + ": a map's name must end in .ot or .bt");
   }
-  const VoxelBox& voxels = map.geometry.voxels();
-  if ((voxels.min.array() < -octomap_format::kKeyOrigin).any() ||
-      (voxels.end.array() > octomap_format::kKeyOrigin).any()) {
-    throw MapFileError(path +
-                       ": the box reaches beyond the 32768 voxels from the origin that an "
-                       "OctoMap can hold");
-  }
+  require_representable(map, path);
   const TreeEncoder tree(map, *encoding);
 
   const std::string unfinished = path + ".part";

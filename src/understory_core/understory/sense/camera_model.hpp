@@ -57,6 +57,7 @@ struct CameraModel {
   double cy = 0.0;
   double max_range_m = 0.0;
 
+  CameraModel() = default;
   explicit CameraModel(const CameraConfig& config);
 };
 

@@ -58,7 +58,7 @@ Lockstep::Lockstep(const SimulationConfig& config,
                config.scene.start.yaw_rad,
                Time{}) {
   law_.set_mode(ControlMode::kTrack);
-  mapper_.mark_free(mission_.launch_site_m(), Time{});
+  mapper_.mark_free(launch_site_m(config.mission, start_position(config.scene.start)), Time{});
 }
 
 Setpoint Lockstep::setpoint_now() {

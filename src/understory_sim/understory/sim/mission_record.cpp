@@ -19,18 +19,6 @@ namespace fs = std::filesystem;
 
 constexpr double kClearanceShownM = 5.0;
 
-Scorer make_scorer(const World& world, Time start) {
-  const SimulationConfig& config = world.config;
-  const GridGeometry geometry(config.explorer.map.resolution_m, config.scene.box.box_m());
-  const double radius_m = config.explorer.plan.vehicle_radius_m;
-  auto coverage = std::make_shared<const CoverageTruth>(*world.truth,
-                                                        geometry,
-                                                        std::vector<Vector3d>{world.start_m()},
-                                                        config.explorer.camera,
-                                                        radius_m);
-  return {world.truth, std::move(coverage), radius_m, start};
-}
-
 void add_score(const Score& score, MissionResult& result) {
   result.coverage = score.coverage;
   result.t50_s = score.t50_s;
@@ -76,8 +64,24 @@ Vector3d World::start_m() const {
   return {start.x_m, start.y_m, start.z_m};
 }
 
-MissionRecord::MissionRecord(const World& world, Time start)
-    : world_(world), start_(start), scorer_(make_scorer(world, start)) {}
+std::shared_ptr<const CoverageTruth> World::coverage_truth() const {
+  const GridGeometry geometry(config.explorer.map.resolution_m, config.scene.box.box_m());
+  return std::make_shared<const CoverageTruth>(*truth,
+                                               geometry,
+                                               std::vector<Vector3d>{start_m()},
+                                               config.explorer.camera,
+                                               config.explorer.plan.vehicle_radius_m);
+}
+
+MissionRecord::MissionRecord(const World& world,
+                             std::shared_ptr<const CoverageTruth> coverage,
+                             Time start)
+    : world_(world),
+      start_(start),
+      scorer_(world.truth,
+              std::move(coverage),
+              world.config.explorer.plan.vehicle_radius_m,
+              start) {}
 
 TickRow MissionRecord::on_frame(const MapSnapshot& map,
                                 const MissionStatus& status,

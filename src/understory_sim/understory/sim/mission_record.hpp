@@ -28,11 +28,13 @@ struct World {
 
   World(SimulationConfig wanted, std::uint64_t world_seed);
   [[nodiscard]] Vector3d start_m() const;
+  // What of it can be seen; takes up to a few seconds.
+  [[nodiscard]] std::shared_ptr<const CoverageTruth> coverage_truth() const;
 };
 
 class MissionRecord {
  public:
-  MissionRecord(const World& world, Time start);
+  MissionRecord(const World& world, std::shared_ptr<const CoverageTruth> coverage, Time start);
 
   // Every simulation step or odometry, in order.
   void on_vehicle(Time time, const VehicleState& state) { scorer_.on_vehicle(time, state); }

@@ -7,7 +7,7 @@
 namespace understory {
 
 MissionRun::MissionRun(const RunSetup& setup)
-    : world_(setup.config, setup.seed), record_(world_, Time{}) {
+    : world_(setup.config, setup.seed), record_(world_, world_.coverage_truth(), Time{}) {
   lockstep_ = std::make_unique<Lockstep>(
       world_.config,
       world_.truth->forest(),

@@ -17,11 +17,9 @@ Box2d extent_of(const Forest& forest) {
 }
 
 Forest cropped_to_scene(const Forest& forest, SceneConfig& scene) {
+  adapt_box(scene);
   CropConfig& crop = scene.crop;
-  BoxConfig& box = scene.box;
   if (scene.crop_mode == "center") {
-    crop.width_m = box.x_max_m - box.x_min_m;
-    crop.height_m = box.y_max_m - box.y_min_m;
     const Vector2d middle = extent_of(forest).center();
     crop.x0_m = middle.x() - 0.5 * crop.width_m;
     crop.y0_m = middle.y() - 0.5 * crop.height_m;
@@ -32,10 +30,6 @@ Forest cropped_to_scene(const Forest& forest, SceneConfig& scene) {
   if (piece.trunks.empty()) {
     throw ForestError(scene.forest_file + ": the crop holds no trunk");
   }
-  box.x_min_m = -0.5 * size.x();
-  box.x_max_m = 0.5 * size.x();
-  box.y_min_m = -0.5 * size.y();
-  box.y_max_m = 0.5 * size.y();
   return piece;
 }
 
@@ -47,6 +41,22 @@ Box3d BoxConfig::box_m() const {
     throw ConfigError("scene.box: each minimum must lie below its maximum");
   }
   return box;
+}
+
+void adapt_box(SceneConfig& scene) {
+  if (scene.source != "file" || scene.crop_mode == "none") {
+    return;
+  }
+  CropConfig& crop = scene.crop;
+  BoxConfig& box = scene.box;
+  if (scene.crop_mode == "center") {
+    crop.width_m = box.x_max_m - box.x_min_m;
+    crop.height_m = box.y_max_m - box.y_min_m;
+  }
+  box.x_min_m = -0.5 * crop.width_m;
+  box.x_max_m = 0.5 * crop.width_m;
+  box.y_min_m = -0.5 * crop.height_m;
+  box.y_max_m = 0.5 * crop.height_m;
 }
 
 Forest build_forest(SceneConfig& scene, const Rng& rng) {

@@ -117,6 +117,9 @@ struct SimulationConfig {
   }
 };
 
+// Gives the box the size of the crop, centred on (0, 0); build_forest does so as well.
+void adapt_box(SceneConfig& scene);
+
 // The scene's forest in the frame of the mission; adapts box and start to a crop.
 [[nodiscard]] Forest build_forest(SceneConfig& scene, const Rng& rng);
 
