@@ -1,0 +1,206 @@
+#!/usr/bin/python3
+# Copyright 2026 the Understory authors
+# SPDX-License-Identifier: BSD-3-Clause
+"""Flies a mission in real time: a ROS master, the onboard process, its live line, the report.
+
+Exit status: that of the onboard process (0 completed without collision, 1 not so, 2 wrong use).
+"""
+
+import argparse
+import os
+import re
+import signal
+import socket
+import subprocess
+import sys
+import time
+import xmlrpc.client
+from pathlib import Path
+from typing import List, Optional
+
+DEFAULT_PORT = 11311
+MASTER_PATIENCE_S = 20.0
+STOP_PATIENCE_S = 30.0
+PASSED_ON = ("forest", "crop", "strategy", "speed-cap", "resume", "onboard-overrides")
+
+
+class FlyError(Exception):
+    pass
+
+
+def parse_arguments(words: List[str]) -> argparse.Namespace:
+    parser = argparse.ArgumentParser(
+        prog="understory fly",
+        description="Flies one mission in real time: the onboard pipeline in one process, with a "
+        "simulated camera and vehicle, and a ROS master of its own.",
+        epilog="While it flies, rostopic, rosbag, rviz and the services see it: set ROS_MASTER_URI "
+        "as printed. Ctrl-C brings the vehicle to rest; results are written.",
+    )
+    parser.add_argument("--scenario", default="small", help="name in config/scenarios, or a file")
+    parser.add_argument("--seed", type=int, default=1, help="of everything random (default: 1)")
+    parser.add_argument("--out", help="result folder (default: results/SCENARIO_SEED_onboard)")
+    parser.add_argument("--camera-size", help="WxH of the simulated camera, in pixels")
+    parser.add_argument("--overrides", default="", help="YAML over the scenario's keys")
+    parser.add_argument("--master", help="URI of a running ROS master instead of an own one")
+    parser.add_argument("--onboard", help=argparse.SUPPRESS)  # the program, set by `understory`
+    parser.add_argument("--quiet", action="store_true", help="no live line")
+    parser.add_argument("--no-report", action="store_true", help="no figures, no latency table")
+    parser.add_argument("--forest", help="stem map (CSV) instead of the scenario's forest")
+    parser.add_argument("--crop", help="X0,Y0,W,H: the piece of the stem map to fly, metres")
+    parser.add_argument("--strategy", help="how targets are chosen")
+    parser.add_argument("--speed-cap", help="paper or strict")
+    parser.add_argument("--resume", help="go on from a saved map (.ot, .bt)")
+    parser.add_argument("--onboard-overrides", help="YAML over config/onboard.yaml")
+    return parser.parse_args(words)
+
+
+def camera_override(size: Optional[str]) -> str:
+    if not size:
+        return ""
+    match = re.fullmatch(r"(\d+)x(\d+)", size)
+    if not match:
+        raise FlyError(f"--camera-size {size}: expected WIDTHxHEIGHT, such as 640x480")
+    return f"camera: {{width_px: {match[1]}, height_px: {match[2]}}}\n"
+
+
+def is_master(uri: str) -> bool:
+    try:
+        code, _, _ = xmlrpc.client.ServerProxy(uri).getPid("/understory_fly")
+        return code == 1
+    except (OSError, ValueError, xmlrpc.client.Error):
+        return False
+
+
+def free_port() -> int:
+    for wanted in (DEFAULT_PORT, 0):
+        with socket.socket() as probe:
+            probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            try:
+                probe.bind(("", wanted))
+                return probe.getsockname()[1]
+            except OSError:
+                continue
+    raise FlyError("no free TCP port for a ROS master")
+
+
+def start_master(log_path: Path) -> "tuple[subprocess.Popen, str]":
+    """An own ROS master, in a session of its own: Ctrl-C is for the flight, not for it."""
+    port = free_port()
+    with open(log_path, "w", encoding="utf-8") as log:
+        try:
+            process = subprocess.Popen(
+                ["rosmaster", "--core", "-p", str(port)],
+                stdin=subprocess.DEVNULL,
+                stdout=log,
+                stderr=log,
+                start_new_session=True,
+            )
+        except FileNotFoundError as error:
+            raise FlyError("rosmaster: not found (./understory setup installs it)") from error
+    uri = f"http://localhost:{port}"
+    until = time.monotonic() + MASTER_PATIENCE_S
+    while not is_master(uri):
+        if process.poll() is not None or time.monotonic() > until:
+            stop(process)
+            raise FlyError(f"the ROS master did not start, see {log_path}")
+        time.sleep(0.05)
+    return process, uri
+
+
+def stop(process: subprocess.Popen) -> None:
+    if process.poll() is None:
+        process.terminate()
+        try:
+            process.wait(5)
+        except subprocess.TimeoutExpired:
+            process.kill()
+            process.wait()
+
+
+def onboard_command(arguments: argparse.Namespace, folder: Path) -> List[str]:
+    command = [arguments.onboard or "onboard", "--scenario", arguments.scenario]
+    command += ["--seed", str(arguments.seed), "--result-folder", str(folder)]
+    overrides = camera_override(arguments.camera_size) + arguments.overrides
+    command += ["--overrides", overrides] if overrides else []
+    for name in PASSED_ON:
+        value = getattr(arguments, name.replace("-", "_"))
+        if value is not None:
+            is_file = name in ("forest", "resume")
+            command += [f"--{name}", str(Path(value).resolve()) if is_file else value]
+    return command + ([] if arguments.quiet else ["--live"])
+
+
+def run_onboard(command: List[str], uri: str, master: Optional[subprocess.Popen]) -> int:
+    """Until it ends; interrupts are passed on, so that the vehicle comes to rest first."""
+    environment = {**os.environ, "ROS_MASTER_URI": uri}
+    environment.setdefault("ROS_IP", "127.0.0.1")
+    environment.setdefault("ROSCONSOLE_FORMAT", "${message}")
+    process = subprocess.Popen(
+        command, env=environment, stdin=subprocess.DEVNULL, start_new_session=True
+    )
+
+    def pass_on(number, _frame):
+        process.send_signal(number)
+
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, pass_on)
+    has_master = master is not None
+    while process.poll() is None:
+        time.sleep(0.1)
+        if has_master and master.poll() is not None:
+            has_master = False
+            print("\nthe ROS master has died; the flight goes on without it", file=sys.stderr)
+    return process.returncode
+
+
+def report(folder: Path) -> bool:
+    """Figures, report.html and the latency table; says where they are."""
+    sources = Path(__file__).resolve().parents[2]
+    scripts = [
+        [sources / "understory_sim/report/report.py", folder],
+        [sources / "understory_nodelets/latency/latency.py", folder],
+    ]
+    good = True
+    for script in scripts:
+        good = subprocess.run(["/usr/bin/python3", *map(str, script)], check=False).returncode == 0 and good
+    print(f"report: {folder / 'report.html'}")
+    return good
+
+
+def fly(arguments: argparse.Namespace) -> int:
+    name = f"{Path(arguments.scenario).stem}_{arguments.seed}_onboard"
+    folder = Path(arguments.out or Path("results") / name).resolve()
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise FlyError(f"{folder}: cannot be made: {error.strerror}") from error
+    command = onboard_command(arguments, folder)
+    master, uri = None, arguments.master or os.environ.get("ROS_MASTER_URI", "")
+    if arguments.master and not is_master(arguments.master):
+        raise FlyError(f"--master {arguments.master}: no ROS master answers there")
+    if not uri or not is_master(uri):
+        master, uri = start_master(folder / "master.log")
+    print(f"export ROS_MASTER_URI={uri}", flush=True)
+    try:
+        status = run_onboard(command, uri, master)
+    finally:
+        if master is not None:
+            stop(master)
+    if status < 0:
+        raise FlyError(f"the onboard process was killed by signal {-status}")
+    if status == 2 or arguments.no_report or not (folder / "result.json").exists():
+        return status
+    return status if report(folder) else max(status, 1)
+
+
+def main() -> int:
+    arguments = parse_arguments(sys.argv[1:])
+    try:
+        return fly(arguments)
+    except FlyError as error:
+        print(f"understory fly: {error}", file=sys.stderr)
+        return 2
+
+
+if __name__ == "__main__":
+    sys.exit(main())

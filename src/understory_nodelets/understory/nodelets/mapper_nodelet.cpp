@@ -1,0 +1,168 @@
+// Copyright 2026 the Understory authors
+// SPDX-License-Identifier: BSD-3-Clause
+//
+// In: camera/depth/points with points_info (organised) and lidar/points (any cloud), each with its
+// pose from tf2 at its own stamp. Out: map_updates. A cloud whose pose is not known in time is
+// skipped and counted. The first pose is where the vehicle starts: the launch site is free.
+#include <memory>
+
+#include <pcl/filters/voxel_grid.h>
+#include <pcl_conversions/pcl_conversions.h>
+#include <pcl_ros/point_cloud.h>
+#include <pluginlib/class_list_macros.hpp>
+#include <tf2_eigen/tf2_eigen.h>
+#include <tf2_ros/transform_listener.h>
+
+#include "understory/map/octomap_io.hpp"
+#include "understory/mission.hpp"
+#include "understory/nodelets/conversions.hpp"
+#include "understory/nodelets/depth_to_cloud.hpp"
+#include "understory/nodelets/flight_setup.hpp"
+#include "understory/nodelets/guarded_nodelet.hpp"
+#include "understory/nodelets/map_update.hpp"
+
+namespace understory {
+namespace {
+
+Mapper make_mapper(const FlightSetup& setup) {
+  const Box3d box_m = setup.config.scene.box.box_m();
+  return setup.resume_file.empty()
+             ? Mapper(setup.config.explorer.map, box_m)
+             : Mapper(load_octomap(setup.resume_file, setup.config.explorer.map, box_m));
+}
+
+}  // namespace
+
+class MapperNodelet : public GuardedNodelet {
+ private:
+  void start() override {
+    ros::NodeHandle& nh = getNodeHandle();
+    const FlightSetup setup = load_flight_setup(nh);
+    mission_ = setup.config.mission;
+    onboard_ = setup.onboard;
+    max_range_m_ = setup.config.explorer.camera.max_range_m;
+    mapper_ = std::make_unique<Mapper>(make_mapper(setup));
+    listener_ = std::make_unique<tf2_ros::TransformListener>(transforms_);
+    publisher_ = nh.advertise<MapUpdate>("map_updates", 1);
+    const ros::TransportHints hints = ros::TransportHints().tcpNoDelay();
+    info_subscriber_ = nh.subscribe("camera/depth/points_info", 1, &MapperNodelet::on_info, this);
+    cloud_subscriber_ =
+        nh.subscribe("camera/depth/points", 1, &MapperNodelet::on_cloud, this, hints);
+    lidar_subscriber_ = nh.subscribe("lidar/points", 1, &MapperNodelet::on_lidar, this, hints);
+  }
+
+  void on_info(const sensor_msgs::CameraInfoConstPtr& info) {
+    guarded([&] { camera_ = to_camera_model(*info, max_range_m_); });
+  }
+
+  void on_cloud(const boost::shared_ptr<const Cloud>& cloud) {
+    guarded([&] { integrate(*cloud); });
+  }
+
+  void on_lidar(const boost::shared_ptr<const Cloud>& cloud) {
+    guarded([&] { integrate_lidar(cloud); });
+  }
+
+  // The pose of a sensor in the map at a stamp; nothing if tf2 does not know it in time.
+  std::optional<Pose> pose_of(const std::string& frame, const ros::Time& stamp) {
+    try {
+      return Pose(tf2::transformToEigen(
+          transforms_.lookupTransform(onboard_.frames.map, frame, stamp,
+                                      ros::Duration(onboard_.frames.wait_s))));
+    } catch (const tf2::TransformException& error) {
+      count("frames_without_pose");
+      NODELET_WARN_THROTTLE(5.0, "%s: frame skipped: %s", getName().c_str(), error.what());
+      return std::nullopt;
+    }
+  }
+
+  bool mark_launch_site(const ros::Time& stamp) {
+    if (!has_launch_site_) {
+      const std::optional<Pose> body = pose_of(onboard_.frames.body, stamp);
+      if (!body) {
+        return false;
+      }
+      mapper_->mark_free(launch_site_m(mission_, body->translation()), to_time(stamp));
+      has_launch_site_ = true;
+    }
+    return true;
+  }
+
+  void integrate(const Cloud& cloud) {
+    const std::int64_t begin_ns = steady_ns();
+    const ros::Time stamp = pcl_conversions::fromPCL(cloud.header.stamp);
+    if (!camera_) {
+      count("clouds_without_camera_info");
+      return;
+    }
+    const std::optional<Pose> pose = pose_of(cloud.header.frame_id, stamp);
+    if (!pose || !mark_launch_site(stamp)) {
+      return;
+    }
+    constexpr std::size_t kFloatsPerPoint = sizeof(pcl::PointXYZ) / sizeof(float);
+    const DepthView depth{cloud.empty() ? nullptr : &cloud.points.front().z, kFloatsPerPoint,
+                          static_cast<int>(cloud.width), static_cast<int>(cloud.height)};
+    const Result<IntegrateCounts, IntegrateError> done =
+        mapper_->integrate(*camera_, depth, *pose, to_time(stamp));
+    publish(done, stamp, begin_ns);
+  }
+
+  void integrate_lidar(const boost::shared_ptr<const Cloud>& cloud) {
+    const std::int64_t begin_ns = steady_ns();
+    const ros::Time stamp = pcl_conversions::fromPCL(cloud->header.stamp);
+    const std::optional<Pose> pose = pose_of(cloud->header.frame_id, stamp);
+    if (!pose || !mark_launch_site(stamp)) {
+      return;
+    }
+    Cloud thinned;
+    if (onboard_.cloud.lidar_leaf_m > 0.0) {
+      const auto leaf = static_cast<float>(onboard_.cloud.lidar_leaf_m);
+      pcl::VoxelGrid<pcl::PointXYZ> grid;
+      grid.setInputCloud(pcl::pcl_ptr(cloud));
+      grid.setLeafSize(leaf, leaf, leaf);
+      grid.filter(thinned);
+    }
+    const Cloud& points = onboard_.cloud.lidar_leaf_m > 0.0 ? thinned : *cloud;
+    const PointsView view{points.empty() ? nullptr : points.points.front().data,
+                          sizeof(pcl::PointXYZ) / sizeof(float), points.size()};
+    publish(mapper_->integrate_rays(view, *pose, onboard_.cloud.lidar_range_m, to_time(stamp)),
+            stamp, begin_ns);
+  }
+
+  void publish(const Result<IntegrateCounts, IntegrateError>& done, const ros::Time& stamp,
+               std::int64_t begin_ns) {
+    if (!done) {
+      count("bad_frames");
+      NODELET_WARN_THROTTLE(5.0, "%s: frame skipped: %s", getName().c_str(),
+                            to_string(done.error()));
+      return;
+    }
+    auto update = boost::make_shared<MapUpdate>();
+    update->header.stamp = stamp;
+    update->header.frame_id = onboard_.frames.map;
+    update->map = mapper_->publish();
+    const auto every = static_cast<std::uint64_t>(onboard_.publish.whole_map_every);
+    update->is_whole = update->map->revision % every == 0;
+    publisher_.publish(MapUpdatePtr(update));
+    trace("map", stamp, begin_ns);
+    count("updates");
+    count("skipped_points", done->skipped_points);
+  }
+
+  MissionConfig mission_;
+  OnboardConfig onboard_;
+  double max_range_m_ = 0.0;
+  std::unique_ptr<Mapper> mapper_;
+  bool has_launch_site_ = false;
+  std::optional<CameraModel> camera_;
+  tf2_ros::Buffer transforms_;
+  std::unique_ptr<tf2_ros::TransformListener> listener_;  // with a thread of its own
+  ros::Publisher publisher_;
+  ros::Subscriber info_subscriber_;
+  ros::Subscriber cloud_subscriber_;
+  ros::Subscriber lidar_subscriber_;
+};
+
+}  // namespace understory
+
+PLUGINLIB_EXPORT_CLASS(understory::MapperNodelet, nodelet::Nodelet)
