@@ -157,13 +157,13 @@ def report(folder: Path) -> bool:
     """Figures, report.html and the latency table; says where they are."""
     sources = Path(__file__).resolve().parents[2]
     scripts = [
-        [sources / "understory_sim/report/report.py", folder],
         [sources / "understory_nodelets/latency/latency.py", folder],
+        [sources / "understory_sim/report/report.py", folder],
     ]
     good = True
     for script in scripts:
-        good = subprocess.run(["/usr/bin/python3", *map(str, script)], check=False).returncode == 0 and good
-    print(f"report: {folder / 'report.html'}")
+        outcome = subprocess.run(["/usr/bin/python3", *map(str, script)], check=False)
+        good = good and outcome.returncode == 0
     return good
 
 

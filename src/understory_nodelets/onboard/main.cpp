@@ -51,7 +51,8 @@ void add_text(CLI::App& app, Options& options, const char* name, const char* wha
 }
 
 std::optional<int> parse(int argc, char** argv, Options& options) {
-  CLI::App app("Runs Understory's onboard pipeline as one process, against a ROS master.", "onboard");
+  CLI::App app("Runs Understory's onboard pipeline as one process, against a ROS master.",
+               "onboard");
   add_text(app, options, "scenario", "name in config/scenarios, or a YAML file");
   add_text(app, options, "forest", "stem map (CSV) instead of the scenario's forest");
   add_text(app, options, "crop", "X0,Y0,W,H: the piece of the stem map to fly, metres");
@@ -65,11 +66,13 @@ std::optional<int> parse(int argc, char** argv, Options& options) {
   add_text(app, options, "frame-prefix", "before the vehicle's tf2 frames, for several vehicles");
   app.add_option("--seed", options.seed, "of everything random");
   app.add_option("--workers", options.workers, "threads for all nodelets")->capture_default_str();
-  app.add_option("--without", options.without,
+  app.add_option("--without",
+                 options.without,
                  "leave out a nodelet: sim_camera with a real camera, bridge with another one, "
                  "recorder, monitor, map_publisher");
   app.add_flag("--live", options.live, "a live line on stderr");
-  app.add_flag("--print-parameters", options.print_parameters,
+  app.add_flag("--print-parameters",
+               options.print_parameters,
                "print every key of config/onboard.yaml as Markdown and exit");
   try {
     app.parse(argc, argv);
@@ -107,8 +110,10 @@ bool load_all(nodelet::Loader& loader, const std::vector<std::string>& without) 
     if (std::find(without.begin(), without.end(), name) != without.end()) {
       continue;
     }
-    if (!loader.load(ros::names::resolve(name), std::string("understory_nodelets/") + type,
-                     ros::names::getRemappings(), {})) {
+    if (!loader.load(ros::names::resolve(name),
+                     std::string("understory_nodelets/") + type,
+                     ros::names::getRemappings(),
+                     {})) {
       fmt::print(stderr, "onboard: {} could not be started, see above\n", name);
       return false;
     }
@@ -162,16 +167,45 @@ class MissionWatch {
   bool is_good_ = false;
 };
 
-int run(Options& options) {
+// The options as parameters, for as long as this process runs: the next one on the same master must
+// not inherit them.
+class OwnParameters {
+ public:
+  OwnParameters(const Options& options, const ros::NodeHandle& nh) : nh_(nh) {
+    for (const auto& [name, value] : options.parameters) {
+      set(name, value);
+    }
+    if (options.seed >= 0) {
+      set("seed", options.seed);
+    }
+    set("live_line", options.live);
+    set(ros::this_node::getName() + "/num_worker_threads", options.workers);
+  }
+  OwnParameters(const OwnParameters&) = delete;
+  OwnParameters& operator=(const OwnParameters&) = delete;
+  ~OwnParameters() {
+    if (!ros::master::check()) {
+      return;  // a call would wait for the master to come back
+    }
+    for (const std::string& name : names_) {
+      nh_.deleteParam(name);
+    }
+  }
+
+ private:
+  template <class Value>
+  void set(const std::string& name, const Value& value) {
+    nh_.setParam(name, value);
+    names_.push_back(name);
+  }
+
+  ros::NodeHandle nh_;
+  std::vector<std::string> names_;
+};
+
+int run(const Options& options) {
   ros::NodeHandle nh;
-  for (const auto& [name, value] : options.parameters) {
-    nh.setParam(name, value);
-  }
-  if (options.seed >= 0) {
-    nh.setParam("seed", options.seed);
-  }
-  nh.setParam("live_line", options.live);
-  ros::param::set("~num_worker_threads", options.workers);
+  const OwnParameters parameters(options, nh);
   MissionWatch watch(nh);
   nodelet::Loader loader(ros::NodeHandle("~"));
   const int status = load_all(loader, options.without) ? watch.wait() : 2;
@@ -198,7 +232,8 @@ int run_main(int argc, char** argv) {
     return 0;
   }
   if (!ros::master::check()) {
-    fmt::print(stderr, "onboard: no ROS master at {} (start roscore, or use understory fly)\n",
+    fmt::print(stderr,
+               "onboard: no ROS master at {} (start roscore, or use understory fly)\n",
                ros::master::getURI());
     return 2;
   }

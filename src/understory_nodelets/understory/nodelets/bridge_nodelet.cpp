@@ -36,8 +36,10 @@ constexpr std::size_t kMostPathPoses = 20000;
 
 std::unique_ptr<Autopilot> make_autopilot(const FlightSetup& setup) {
   const World world(setup.config, setup.seed);
-  return std::make_unique<SimulatedAutopilot>(world.config.vehicle, world.config.control,
-                                              world.start_m(), world.config.scene.start.yaw_rad,
+  return std::make_unique<SimulatedAutopilot>(world.config.vehicle,
+                                              world.config.control,
+                                              world.start_m(),
+                                              world.config.scene.start.yaw_rad,
                                               Rng(setup.seed).fork("wind"));
 }
 
@@ -73,8 +75,8 @@ class BridgeNodelet : public GuardedNodelet {
     path_publisher_ = nh.advertise<nav_msgs::Path>("flown_path", 1);
     // Pages are locked as they are touched, not ahead: thread stacks would take hundreds of MB.
     is_locked_ = mlockall(MCL_CURRENT | MCL_FUTURE | MCL_ONFAULT) == 0;
-    flight_ = std::make_unique<FlightLoop>(setup.onboard.flight, setup.config.scene.box.box_m(),
-                                           make_autopilot(setup));
+    flight_ = std::make_unique<FlightLoop>(
+        setup.onboard.flight, setup.config.scene.box.box_m(), make_autopilot(setup));
     telemetry_thread_ = std::thread([this] { publish_telemetry(); });
     const ros::TransportHints hints = ros::TransportHints().tcpNoDelay();
     trajectory_subscriber_ =
@@ -85,7 +87,7 @@ class BridgeNodelet : public GuardedNodelet {
   void on_trajectory(const TrajectoryUpdatePtr& update) {
     guarded([&] {
       if (!update->trajectory) {
-        count("trajectories_refused");
+        skip("trajectories_refused", "trajectory that makes no sense");
         return;
       }
       published_ns_ = steady_ns();

@@ -32,8 +32,8 @@ Time to_time(const ros::Time& time) {
 
 ros::Time to_ros(Time time) {
   ros::Time stamp;
-  stamp.fromNSec(static_cast<std::uint64_t>(time.time_since_epoch().count() *
-                                            kNanosecondsPerMicrosecond));
+  stamp.fromNSec(
+      static_cast<std::uint64_t>(time.time_since_epoch().count() * kNanosecondsPerMicrosecond));
   return stamp;
 }
 
@@ -62,8 +62,7 @@ nav_msgs::Odometry to_odometry(const Telemetry& telemetry,
   odometry.pose.pose.orientation.x = state.world_from_body.x();
   odometry.pose.pose.orientation.y = state.world_from_body.y();
   odometry.pose.pose.orientation.z = state.world_from_body.z();
-  odometry.twist.twist.linear =
-      to_vector3(state.world_from_body.conjugate() * state.velocity_mps);
+  odometry.twist.twist.linear = to_vector3(state.world_from_body.conjugate() * state.velocity_mps);
   odometry.twist.twist.angular = to_vector3(state.body_rates_radps);
   return odometry;
 }

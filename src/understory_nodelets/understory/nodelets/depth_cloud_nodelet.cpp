@@ -32,9 +32,13 @@ class DepthCloudNodelet : public GuardedNodelet {
     }
     cloud_publisher_ = nh.advertise<Cloud>("camera/depth/points", 1);
     info_publisher_ = nh.advertise<sensor_msgs::CameraInfo>("camera/depth/points_info", 1);
-    info_subscriber_ = nh.subscribe("camera/depth/camera_info", 1, &DepthCloudNodelet::on_info, this);
-    image_subscriber_ = nh.subscribe("camera/depth/image_rect", 1, &DepthCloudNodelet::on_image,
-                                     this, ros::TransportHints().tcpNoDelay());
+    info_subscriber_ =
+        nh.subscribe("camera/depth/camera_info", 1, &DepthCloudNodelet::on_info, this);
+    image_subscriber_ = nh.subscribe("camera/depth/image_rect",
+                                     1,
+                                     &DepthCloudNodelet::on_image,
+                                     this,
+                                     ros::TransportHints().tcpNoDelay());
   }
 
   void publish_extrinsics(const FlightSetup& setup) {
@@ -50,7 +54,7 @@ class DepthCloudNodelet : public GuardedNodelet {
     guarded([&] {
       camera_ = to_camera_model(*info, max_range_m_);
       if (!camera_) {
-        count("bad_camera_info");
+        skip("bad_camera_info", "camera_info is of no calibrated pinhole camera");
       }
     });
   }
@@ -62,19 +66,17 @@ class DepthCloudNodelet : public GuardedNodelet {
   void convert(const sensor_msgs::Image& image) {
     const std::int64_t begin_ns = steady_ns();
     if (!camera_) {
-      count("images_without_camera_info");
+      skip("images_without_camera_info", "image without camera_info");
       return;
     }
     if (image.header.stamp <= last_stamp_) {
-      count("images_not_newer");
+      skip("images_not_newer", "image no newer than the one before");
       return;
     }
     const std::shared_ptr<Cloud> cloud = clouds_.take();
     const Result<std::size_t, ImageError> measured = fill_cloud(image, *camera_, config_, *cloud);
     if (!measured) {
-      count("bad_images");
-      NODELET_WARN_THROTTLE(5.0, "%s: image skipped: %s", getName().c_str(),
-                            to_string(measured.error()));
+      skip("bad_images", to_string(measured.error()));
       return;
     }
     last_stamp_ = image.header.stamp;

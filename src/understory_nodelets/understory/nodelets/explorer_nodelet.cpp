@@ -27,8 +27,8 @@ class ExplorerNodelet : public GuardedNodelet {
   void start() override {
     ros::NodeHandle& nh = getNodeHandle();
     setup_ = load_flight_setup(nh);
-    receiver_ = std::make_unique<MapReceiver>(setup_.config.explorer.map,
-                                              setup_.config.scene.box.box_m());
+    receiver_ =
+        std::make_unique<MapReceiver>(setup_.config.explorer.map, setup_.config.scene.box.box_m());
     trajectory_publisher_ = nh.advertise<TrajectoryUpdate>("trajectory", 10);
     status_publisher_ = nh.advertise<understory_msgs::MissionStatus>("status", 10);
     markers_publisher_ = nh.advertise<visualization_msgs::MarkerArray>("markers", 1);
@@ -61,7 +61,7 @@ class ExplorerNodelet : public GuardedNodelet {
         start_state_ = state;
         odometry_subscriber_.shutdown();  // what is planned begins on what is flown
       } else {
-        count("bad_odometry");
+        skip("bad_odometry", "odometry that is not finite");
       }
     });
   }
@@ -107,7 +107,7 @@ class ExplorerNodelet : public GuardedNodelet {
         answer = {!mission_->is_over(), mission_->stop(StopReason::kInterrupted, now)};
         break;
       default:
-        count("unknown_commands");
+        skip("unknown_commands", "unknown command");
     }
     publish(answer.published);
     publish_status(now);
@@ -118,7 +118,7 @@ class ExplorerNodelet : public GuardedNodelet {
     const std::int64_t begin_ns = steady_ns();
     const MapSnapshotPtr map = receiver_->accept(update);
     if (!map) {
-      count("maps_refused");
+      skip("maps_refused", "map that does not follow on what was received");
       return;
     }
     last_map_ns_ = begin_ns;
@@ -128,9 +128,12 @@ class ExplorerNodelet : public GuardedNodelet {
         count("maps_before_odometry");
         return;
       }
-      mission_ = std::make_unique<Mission>(setup_.config.mission, setup_.config.explorer,
-                                           map->geometry, start_state_->position_m,
-                                           yaw_of(start_state_->world_from_body), now);
+      mission_ = std::make_unique<Mission>(setup_.config.mission,
+                                           setup_.config.explorer,
+                                           map->geometry,
+                                           start_state_->position_m,
+                                           yaw_of(start_state_->world_from_body),
+                                           now);
     }
     if (!has_failed_) {
       const MissionStep step = mission_->on_map(map, now);
@@ -153,7 +156,7 @@ class ExplorerNodelet : public GuardedNodelet {
     const bool is_too_late = to_seconds(late) > setup_.onboard.watch.late_decision_s;
     if (is_too_late && trajectory->mode != FlightMode::kBrake) {
       mission_->withdraw(trajectory);
-      count("withdrawn_trajectories");
+      skip("withdrawn_trajectories", "trajectory that was decided too late");
       return false;
     }
     publish(trajectory);
@@ -177,7 +180,8 @@ class ExplorerNodelet : public GuardedNodelet {
   }
 
   void publish_status(Time now) {
-    auto msg = boost::make_shared<understory_msgs::MissionStatus>(to_msg(status_of(*mission_, now)));
+    auto msg =
+        boost::make_shared<understory_msgs::MissionStatus>(to_msg(status_of(*mission_, now)));
     msg->header.frame_id = setup_.onboard.frames.map;
     status_publisher_.publish(understory_msgs::MissionStatusConstPtr(msg));
     for (std::size_t i = 0; i < msg->counter_names.size(); ++i) {
@@ -199,8 +203,8 @@ class ExplorerNodelet : public GuardedNodelet {
 
   // Without maps nothing new is planned and what is flown ends at rest; the mission must end too.
   void watch() {
-    const bool is_flying = mission_ && !mission_->is_over() &&
-                           mission_->state() != MissionState::kWaiting;
+    const bool is_flying =
+        mission_ && !mission_->is_over() && mission_->state() != MissionState::kWaiting;
     const double silent_s = static_cast<double>(steady_ns() - last_map_ns_) * 1e-9;
     if (is_flying && silent_s > setup_.onboard.watch.frames_s) {
       NODELET_ERROR("%s: no map for %.1f s: the mission ends here", getName().c_str(), silent_s);

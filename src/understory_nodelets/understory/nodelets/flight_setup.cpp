@@ -25,7 +25,8 @@ std::string text_parameter(const ros::NodeHandle& nh, const std::string& name) {
 std::uint64_t seed_parameter(const ros::NodeHandle& nh) {
   int seed = 1;
   if (nh.hasParam("seed") && (!nh.getParam("seed", seed) || seed < 0)) {
-    throw ConfigError("parameter " + nh.resolveName("seed") + ": must be a whole number, 0 or more");
+    throw ConfigError("parameter " + nh.resolveName("seed") +
+                      ": must be a whole number, 0 or more");
   }
   return static_cast<std::uint64_t>(seed);
 }

@@ -37,6 +37,9 @@ void GuardedNodelet::onInit() {
                                    [this](const ros::TimerEvent&) { publish_health(); });
   } catch (const std::exception& error) {
     NODELET_FATAL("%s: %s", getName().c_str(), error.what());
+    // The loader destroys the callback queues of a nodelet that fails before the nodelet itself.
+    getNodeHandle().shutdown();
+    getPrivateNodeHandle().shutdown();
     throw;
   }
 }
@@ -64,6 +67,12 @@ void GuardedNodelet::guarded(const std::function<void()>& callback) {
   }
 }
 
+void GuardedNodelet::skip(const std::string& counter, const std::string& why) {
+  count(counter);
+  last_skip_ = why;
+  NODELET_WARN_THROTTLE(kReportPeriodS, "%s: skipped: %s", getName().c_str(), why.c_str());
+}
+
 GuardedNodelet::Health GuardedNodelet::health() {
   return {};
 }
@@ -72,7 +81,9 @@ void GuardedNodelet::trace(const char* stage, const ros::Time& exposure, std::in
   trace(stage, exposure, begin_ns, steady_ns());
 }
 
-void GuardedNodelet::trace(const char* stage, const ros::Time& exposure, std::int64_t begin_ns,
+void GuardedNodelet::trace(const char* stage,
+                           const ros::Time& exposure,
+                           std::int64_t begin_ns,
                            std::int64_t end_ns) {
   auto mark = boost::make_shared<understory_msgs::Trace>();
   mark->header.stamp = exposure;
@@ -84,6 +95,10 @@ void GuardedNodelet::trace(const char* stage, const ros::Time& exposure, std::in
 
 void GuardedNodelet::publish_health() {
   Health found = health();
+  if (!last_skip_.empty() && found.level == DiagnosticStatus::OK) {
+    found = {DiagnosticStatus::WARN, "skipped: " + last_skip_};
+    last_skip_.clear();
+  }
   if (failures_ > 0) {
     found = {DiagnosticStatus::ERROR, "failed: " + last_failure_};
   }

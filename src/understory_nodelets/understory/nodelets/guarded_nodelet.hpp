@@ -4,7 +4,8 @@
 // What every nodelet here does: a start that fails loudly (roscpp would swallow the reason),
 // callbacks whose exceptions are counted and reported instead of ending the process, and a
 // diagnostic status once a second. Single-threaded handles only: callbacks of one nodelet never
-// overlap, so it needs no lock. Subclasses override start() and, if they have more to say, health().
+// overlap, so it needs no lock. Subclasses override start() and, if they have more to say,
+// health().
 #pragma once
 
 #include <cstdint>
@@ -39,10 +40,14 @@ class GuardedNodelet : public nodelet::Nodelet {
   // Runs it; an exception is counted and reported.
   void guarded(const std::function<void()>& callback);
   void count(const std::string& what, std::uint64_t by = 1) { counters_[what] += by; }
+  // Bad input: counted, logged now and then, and a warning in the next diagnostics.
+  void skip(const std::string& counter, const std::string& why);
   void set_counter(const std::string& what, std::uint64_t value) { counters_[what] = value; }
   // Marks of one stage on one frame, for `understory latency`.
   void trace(const char* stage, const ros::Time& exposure, std::int64_t begin_ns);
-  void trace(const char* stage, const ros::Time& exposure, std::int64_t begin_ns,
+  void trace(const char* stage,
+             const ros::Time& exposure,
+             std::int64_t begin_ns,
              std::int64_t end_ns);
 
  private:
@@ -57,6 +62,7 @@ class GuardedNodelet : public nodelet::Nodelet {
   std::uint64_t calls_ = 0;
   int fail_after_calls_ = 0;  // fault injection for tests: parameter ~fail_after_calls
   std::string last_failure_;
+  std::string last_skip_;  // since the last diagnostics
 };
 
 }  // namespace understory

@@ -50,7 +50,8 @@ boost::shared_ptr<const Cloud> occupied_points(const MapSnapshot& map,
   return to_boost<Cloud>(cloud);
 }
 
-octomap_msgs::Octomap to_octomap(const MapSnapshot& map, const std_msgs::Header& header,
+octomap_msgs::Octomap to_octomap(const MapSnapshot& map,
+                                 const std_msgs::Header& header,
                                  bool is_binary) {
   const std::string tree = octomap_tree(map, is_binary);
   octomap_msgs::Octomap msg;
@@ -69,8 +70,8 @@ class MapPublisherNodelet : public GuardedNodelet {
   void start() override {
     ros::NodeHandle& nh = getNodeHandle();
     const FlightSetup setup = load_flight_setup(nh);
-    receiver_ = std::make_unique<MapReceiver>(setup.config.explorer.map,
-                                              setup.config.scene.box.box_m());
+    receiver_ =
+        std::make_unique<MapReceiver>(setup.config.explorer.map, setup.config.scene.box.box_m());
     binary_publisher_ = nh.advertise<octomap_msgs::Octomap>("octomap_binary", 1);
     full_publisher_ = nh.advertise<octomap_msgs::Octomap>("octomap_full", 1);
     points_publisher_ = nh.advertise<Cloud>("occupied_points", 1);

@@ -60,7 +60,8 @@ understory_msgs::MapUpdate to_msg(const MapUpdate& update) {
 }
 
 MapReceiver::MapReceiver(const MapConfig& config, const Box3d& box_m)
-    : unknown_{GridGeometry(config.resolution_m, box_m), SensorModel(config.sensor), 0, {}, {}, {}} {
+    : unknown_{
+          GridGeometry(config.resolution_m, box_m), SensorModel(config.sensor), 0, {}, {}, {}} {
   unknown_.tiles.resize(unknown_.geometry.slot_count());
 }
 

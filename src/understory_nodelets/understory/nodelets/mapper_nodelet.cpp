@@ -66,12 +66,10 @@ class MapperNodelet : public GuardedNodelet {
   // The pose of a sensor in the map at a stamp; nothing if tf2 does not know it in time.
   std::optional<Pose> pose_of(const std::string& frame, const ros::Time& stamp) {
     try {
-      return Pose(tf2::transformToEigen(
-          transforms_.lookupTransform(onboard_.frames.map, frame, stamp,
-                                      ros::Duration(onboard_.frames.wait_s))));
+      return Pose(tf2::transformToEigen(transforms_.lookupTransform(
+          onboard_.frames.map, frame, stamp, ros::Duration(onboard_.frames.wait_s))));
     } catch (const tf2::TransformException& error) {
-      count("frames_without_pose");
-      NODELET_WARN_THROTTLE(5.0, "%s: frame skipped: %s", getName().c_str(), error.what());
+      skip("frames_without_pose", error.what());
       return std::nullopt;
     }
   }
@@ -92,7 +90,7 @@ class MapperNodelet : public GuardedNodelet {
     const std::int64_t begin_ns = steady_ns();
     const ros::Time stamp = pcl_conversions::fromPCL(cloud.header.stamp);
     if (!camera_) {
-      count("clouds_without_camera_info");
+      skip("clouds_without_camera_info", "cloud without camera_info");
       return;
     }
     const std::optional<Pose> pose = pose_of(cloud.header.frame_id, stamp);
@@ -100,8 +98,10 @@ class MapperNodelet : public GuardedNodelet {
       return;
     }
     constexpr std::size_t kFloatsPerPoint = sizeof(pcl::PointXYZ) / sizeof(float);
-    const DepthView depth{cloud.empty() ? nullptr : &cloud.points.front().z, kFloatsPerPoint,
-                          static_cast<int>(cloud.width), static_cast<int>(cloud.height)};
+    const DepthView depth{cloud.empty() ? nullptr : &cloud.points.front().z,
+                          kFloatsPerPoint,
+                          static_cast<int>(cloud.width),
+                          static_cast<int>(cloud.height)};
     const Result<IntegrateCounts, IntegrateError> done =
         mapper_->integrate(*camera_, depth, *pose, to_time(stamp));
     publish(done, stamp, begin_ns);
@@ -124,17 +124,18 @@ class MapperNodelet : public GuardedNodelet {
     }
     const Cloud& points = onboard_.cloud.lidar_leaf_m > 0.0 ? thinned : *cloud;
     const PointsView view{points.empty() ? nullptr : points.points.front().data,
-                          sizeof(pcl::PointXYZ) / sizeof(float), points.size()};
+                          sizeof(pcl::PointXYZ) / sizeof(float),
+                          points.size()};
     publish(mapper_->integrate_rays(view, *pose, onboard_.cloud.lidar_range_m, to_time(stamp)),
-            stamp, begin_ns);
+            stamp,
+            begin_ns);
   }
 
-  void publish(const Result<IntegrateCounts, IntegrateError>& done, const ros::Time& stamp,
+  void publish(const Result<IntegrateCounts, IntegrateError>& done,
+               const ros::Time& stamp,
                std::int64_t begin_ns) {
     if (!done) {
-      count("bad_frames");
-      NODELET_WARN_THROTTLE(5.0, "%s: frame skipped: %s", getName().c_str(),
-                            to_string(done.error()));
+      skip("bad_frames", to_string(done.error()));
       return;
     }
     auto update = boost::make_shared<MapUpdate>();

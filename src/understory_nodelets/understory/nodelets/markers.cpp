@@ -32,7 +32,9 @@ const std_msgs::ColorRGBA kTargetColor = color({0.90F, 0.10F, 0.15F, 1.0F});
 const std_msgs::ColorRGBA kTrajectoryColor = color({0.05F, 0.75F, 0.35F, 1.0F});
 const std_msgs::ColorRGBA kTextColor = color({1.0F, 1.0F, 1.0F, 1.0F});
 
-Marker marker(const MarkerContext& context, const char* name, int type,
+Marker marker(const MarkerContext& context,
+              const char* name,
+              int type,
               const std_msgs::ColorRGBA& marker_color) {
   Marker marker;
   marker.header.frame_id = context.map_frame;
@@ -45,7 +47,8 @@ Marker marker(const MarkerContext& context, const char* name, int type,
   return marker;
 }
 
-Marker cubes(const MarkerContext& context, const char* name,
+Marker cubes(const MarkerContext& context,
+             const char* name,
              const std_msgs::ColorRGBA& marker_color) {
   Marker cubes = marker(context, name, Marker::CUBE_LIST, marker_color);
   cubes.scale.x = cubes.scale.y = cubes.scale.z = context.resolution_m;
@@ -62,8 +65,10 @@ void add(Marker marker, visualization_msgs::MarkerArray& array) {
   array.markers.push_back(std::move(marker));
 }
 
-void add_clusters(const Explorer& explorer, const GridGeometry& geometry,
-                  const MarkerContext& context, visualization_msgs::MarkerArray& array) {
+void add_clusters(const Explorer& explorer,
+                  const GridGeometry& geometry,
+                  const MarkerContext& context,
+                  visualization_msgs::MarkerArray& array) {
   Marker frontiers = cubes(context, "frontiers", kFrontierColor);
   Marker trails = cubes(context, "trails", kTrailColor);
   Marker viewpoints = marker(context, "viewpoints", Marker::LINE_LIST, kViewpointColor);
@@ -85,20 +90,21 @@ void add_clusters(const Explorer& explorer, const GridGeometry& geometry,
   add(std::move(viewpoints), array);
 }
 
-void add_target(const Mission& mission, const MarkerContext& context,
+void add_target(const Mission& mission,
+                const MarkerContext& context,
                 visualization_msgs::MarkerArray& array) {
   Marker target = marker(context, "target", Marker::SPHERE, kTargetColor);
   target.scale.x = target.scale.y = target.scale.z = 0.35;
   if (mission.explorer().target()) {
-    target.pose.position =
-        to_point(mission.explorer().target()->candidate.viewpoint.position_m);
+    target.pose.position = to_point(mission.explorer().target()->candidate.viewpoint.position_m);
   } else {
     target.action = Marker::DELETE;
   }
   array.markers.push_back(std::move(target));
 }
 
-void add_trajectory(const Trajectory& flown, const MarkerContext& context,
+void add_trajectory(const Trajectory& flown,
+                    const MarkerContext& context,
                     visualization_msgs::MarkerArray& array) {
   Marker line = marker(context, "trajectory", Marker::LINE_STRIP, kTrajectoryColor);
   line.scale.x = 0.06;

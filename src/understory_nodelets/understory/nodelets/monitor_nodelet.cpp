@@ -39,14 +39,20 @@ class MonitorNodelet : public GuardedNodelet {
     ros::NodeHandle& nh = getNodeHandle();
     const ros::TransportHints hints = ros::TransportHints().tcpNoDelay();
     info_subscriber_ = nh.subscribe<sensor_msgs::CameraInfo>(
-        "camera/depth/camera_info", 1,
-        [this](const sensor_msgs::CameraInfoConstPtr&) { camera_.seen(); }, {}, hints);
+        "camera/depth/camera_info",
+        1,
+        [this](const sensor_msgs::CameraInfoConstPtr&) { camera_.seen(); },
+        {},
+        hints);
     map_subscriber_ = nh.subscribe<MapUpdate>(
         "map_updates", 1, [this](const MapUpdatePtr&) { map_.seen(); }, {}, hints);
     odometry_subscriber_ = nh.subscribe<nav_msgs::Odometry>(
         "odometry", 1, [this](const nav_msgs::OdometryConstPtr&) { odometry_.seen(); }, {}, hints);
     status_subscriber_ = nh.subscribe<understory_msgs::MissionStatus>(
-        "status", 1, [this](const understory_msgs::MissionStatusConstPtr&) { mission_.seen(); }, {},
+        "status",
+        1,
+        [this](const understory_msgs::MissionStatusConstPtr&) { mission_.seen(); },
+        {},
         hints);
   }
 

@@ -25,8 +25,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr double kSettleS = 8.0;       // to land or come to rest after the mission's last word
-constexpr double kSilenceS = 20.0;     // without a word from the mission, it is over
+constexpr double kSettleS = 8.0;    // to land or come to rest after the mission's last word
+constexpr double kSilenceS = 20.0;  // without a word from the mission, it is over
 constexpr double kStillMps = 0.05;
 
 }  // namespace
@@ -45,8 +45,8 @@ class RecorderNodelet : public GuardedNodelet {
     ros::NodeHandle& nh = getNodeHandle();
     const FlightSetup setup = load_flight_setup(nh);
     world_ = std::make_unique<World>(setup.config, setup.seed);
-    receiver_ = std::make_unique<MapReceiver>(setup.config.explorer.map,
-                                              world_->config.scene.box.box_m());
+    receiver_ =
+        std::make_unique<MapReceiver>(setup.config.explorer.map, world_->config.scene.box.box_m());
     bool live = false;
     nh.param("live_line", live, false);
     live_ = std::make_unique<LiveLine>(!live);

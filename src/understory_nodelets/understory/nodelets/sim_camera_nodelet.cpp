@@ -37,9 +37,8 @@ class SimCameraNodelet : public GuardedNodelet {
     info_.header.frame_id = setup.onboard.frames.camera;
     image_publisher_ = nh.advertise<sensor_msgs::Image>("camera/depth/image_rect", 1);
     info_publisher_ = nh.advertise<sensor_msgs::CameraInfo>("camera/depth/camera_info", 1);
-    odometry_subscriber_ =
-        nh.subscribe("odometry", 1, &SimCameraNodelet::on_odometry, this,
-                     ros::TransportHints().tcpNoDelay());
+    odometry_subscriber_ = nh.subscribe(
+        "odometry", 1, &SimCameraNodelet::on_odometry, this, ros::TransportHints().tcpNoDelay());
   }
 
   void on_odometry(const nav_msgs::OdometryConstPtr& odometry) {
@@ -55,7 +54,7 @@ class SimCameraNodelet : public GuardedNodelet {
   void expose(const nav_msgs::Odometry& odometry) {
     const std::optional<VehicleState> vehicle = to_vehicle_state(odometry);
     if (!vehicle) {
-      count("bad_odometry");
+      skip("bad_odometry", "odometry that is not finite");
       return;
     }
     const std::int64_t begin_ns = steady_ns();
