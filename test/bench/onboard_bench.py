@@ -15,6 +15,7 @@ import subprocess
 import sys
 import tempfile
 import time
+import xmlrpc.client
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -70,21 +71,22 @@ def commands(kind, options, folder):
     ]
 
 
-def set_parameters(environment, options, folder):
+def set_parameters(uri, options, folder):
     values = {
         "scenario": options.scenario,
         "overrides": fly.camera_override(options.camera_size).strip(),
         "result_folder": str(folder),
     }
+    server = xmlrpc.client.ServerProxy(uri)
     for name, value in values.items():
-        subprocess.run(["rosparam", "set", name, value], check=True, env=environment)
+        server.setParam("/onboard_bench", f"/{name}", value)
 
 
 def measure(kind, options, folder, environment):
     """{row: Statistics}, CPU seconds per second, and those without the camera's rendering."""
     folder.mkdir(parents=True)
     if kind != "one process":
-        set_parameters(environment, options, folder)
+        set_parameters(environment["ROS_MASTER_URI"], options, folder)
     processes = [
         subprocess.Popen(
             [str(word) for word in command],

@@ -45,7 +45,7 @@ std::string bytes_of(const std::string& path) {
 
 void expect_good(const MissionResult& result, std::uint64_t seed) {
   EXPECT_TRUE(result.completed) << "seed " << seed << ": " << result.stop_reason;
-  EXPECT_GE(result.coverage, 0.99) << "seed " << seed;
+  EXPECT_GE(result.coverage.value(), 0.99) << "seed " << seed;
   EXPECT_EQ(result.collisions, 0U) << "seed " << seed;
   EXPECT_EQ(result.counters.at("failed_brakes"), 0U) << "seed " << seed;
 }
@@ -156,7 +156,7 @@ TEST(Mission, InterruptedMissionComesToRestAndKeepsItsResult) {
   EXPECT_FALSE(result.completed);
   EXPECT_LT(last_speed_mps, 0.1);
   EXPECT_LT(result.mission_time_s, 8.0 + 12.0);
-  EXPECT_GT(result.coverage, 0.02);
+  EXPECT_GT(result.coverage.value(), 0.02);
 }
 
 TEST(Mission, TimeLimitEndsTheMissionAtRest) {

@@ -146,6 +146,7 @@ TEST_F(ResultJson, HoldsEveryPromisedKeyInAFixedOrder) {
   result.completion_time_s = 451.2;
   result.mission_time_s = 470.5;
   result.coverage = 0.1 + 0.2;
+  result.collisions = 0;
   result.t50_s = 120.0;
   result.min_clearance_m = 0.31;
   result.volume_at = {{100.0, 1200.5}};
@@ -263,7 +264,7 @@ TEST_F(Ticks, AreWrittenWithFixedPrecision) {
                 "12.067,1.0000,-2.5000,1.0000,0.3000,0.4000,0.0000,0.5000,3.1416,-0.9000,"
                 "collector,explore,0.123457,617.250,41,7,2,99,4.0000,5.0000,1.0000,0.6123\n"
                 "0.000,0.0000,0.0000,0.0000,0.0000,0.0000,0.0000,0.0000,0.0000,0.0000,"
-                "explorer,take_off,0.000000,0.000,0,0,0,,,,,\n");
+                "explorer,take_off,,0.000,0,0,0,,,,,\n");
 }
 
 TEST_F(Ticks, MissionWithoutTicksLeavesTheHeader) {

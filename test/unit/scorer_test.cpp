@@ -167,7 +167,7 @@ TEST_F(ScorerTest, ReportsWhenSharesWereReachedFirst) {
   EXPECT_EQ(score.t90_s, 30.0);
   EXPECT_EQ(score.t95_s, 40.0);
   EXPECT_FALSE(score.t99_s.has_value());
-  EXPECT_NEAR(score.coverage, 0.96, 0.001);
+  EXPECT_NEAR(score.coverage.value(), 0.96, 0.001);
 }
 
 TEST_F(ScorerTest, KeepsTheVolumeAsOfEveryFullMinute) {

@@ -35,6 +35,7 @@ struct Options {
   int seed = -1;
   int workers = 2;
   bool live = false;
+  bool real = false;
   bool print_parameters = false;
   std::vector<std::string> without;
 };
@@ -70,6 +71,8 @@ std::optional<int> parse(int argc, char** argv, Options& options) {
                  options.without,
                  "leave out a nodelet: sim_camera with a real camera, bridge with another one, "
                  "recorder, monitor, map_publisher");
+  app.add_flag(
+      "--real", options.real, "a real flight: no simulated camera, and results without the truth");
   app.add_flag("--live", options.live, "a live line on stderr");
   app.add_flag("--print-parameters",
                options.print_parameters,
@@ -78,6 +81,9 @@ std::optional<int> parse(int argc, char** argv, Options& options) {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? 0 : 2;
+  }
+  if (options.real) {
+    options.without.emplace_back("sim_camera");
   }
   return std::nullopt;
 }
@@ -179,6 +185,7 @@ class OwnParameters {
       set("seed", options.seed);
     }
     set("live_line", options.live);
+    set("simulated", !options.real);
     set(ros::this_node::getName() + "/num_worker_threads", options.workers);
   }
   OwnParameters(const OwnParameters&) = delete;

@@ -1,10 +1,11 @@
 // Copyright 2026 the Understory authors
 // SPDX-License-Identifier: BSD-3-Clause
 //
-// Judges a simulated flight by the true world and writes its result folder (parameter
-// result_folder of the vehicle's namespace; empty: nothing is written). In: odometry, map_updates,
-// status, flight_status, trace, flight_timing. Out: result, once the mission is over and the
-// vehicle is down or at rest. What there is is also written when the nodelet is unloaded before.
+// Records a flight, judges a simulated one by the true world, and writes its result folder
+// (parameters of the vehicle's namespace: result_folder, empty: nothing is written; simulated). In:
+// odometry, map_updates, status, flight_status, trace, flight_timing. Out: result, once the mission
+// is over and the vehicle is down or at rest. What there is is also written when the nodelet is
+// unloaded before.
 #include <filesystem>
 #include <memory>
 
@@ -44,7 +45,10 @@ class RecorderNodelet : public GuardedNodelet {
   void start() override {
     ros::NodeHandle& nh = getNodeHandle();
     const FlightSetup setup = load_flight_setup(nh);
-    world_ = std::make_unique<World>(setup.config, setup.seed);
+    bool simulated = true;
+    nh.param("simulated", simulated, true);
+    world_ = simulated ? std::make_unique<World>(setup.config, setup.seed)
+                       : std::make_unique<World>(setup.config);
     receiver_ =
         std::make_unique<MapReceiver>(setup.config.explorer.map, world_->config.scene.box.box_m());
     bool live = false;
@@ -171,7 +175,7 @@ class RecorderNodelet : public GuardedNodelet {
     }
     auto msg = boost::make_shared<understory_msgs::MissionResult>();
     msg->header.stamp = ros::Time::now();
-    msg->good = static_cast<std::uint8_t>(result.completed && result.collisions == 0);
+    msg->good = static_cast<std::uint8_t>(result.is_good());
     msg->stop_reason = result.stop_reason;
     msg->folder = folder_;
     msg->summary = summary_of(result);

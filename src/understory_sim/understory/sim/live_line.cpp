@@ -21,18 +21,18 @@ LiveLine::LiveLine(bool is_quiet)
       next_(std::chrono::steady_clock::now()) {}
 
 void LiveLine::print(const TickRow& row, double realtime_factor) const {
-  fmt::print(
-      stderr,
-      "{}t {:6.1f} s  coverage {:5.1f} %  {:4.2f} m/s  {:<11} {:<10} {:3} clusters  x{:.0f}{}",
-      is_terminal_ ? "\r" : "",
-      row.time_s,
-      100.0 * row.coverage,
-      row.velocity_mps.norm(),
-      row.mission_state,
-      row.mode,
-      row.clusters,
-      realtime_factor,
-      is_terminal_ ? "\033[K" : "\n");
+  fmt::print(stderr,
+             "{}t {:6.1f} s  {}  {:4.2f} m/s  {:<11} {:<10} {:3} clusters  x{:.0f}{}",
+             is_terminal_ ? "\r" : "",
+             row.time_s,
+             row.coverage ? fmt::format("coverage {:5.1f} %", 100.0 * *row.coverage)
+                          : fmt::format("{:7.1f} m3 known", row.explored_volume_m3),
+             row.velocity_mps.norm(),
+             row.mission_state,
+             row.mode,
+             row.clusters,
+             realtime_factor,
+             is_terminal_ ? "\033[K" : "\n");
   static_cast<void>(std::fflush(stderr));
 }
 

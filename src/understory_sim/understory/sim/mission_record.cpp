@@ -19,6 +19,16 @@ namespace fs = std::filesystem;
 
 constexpr double kClearanceShownM = 5.0;
 
+Scorer make_scorer(const World& world, std::shared_ptr<const CoverageTruth> coverage, Time start) {
+  const double radius_m = world.config.explorer.plan.vehicle_radius_m;
+  if (!world.truth) {
+    return {GridGeometry(world.config.explorer.map.resolution_m, world.config.scene.box.box_m()),
+            radius_m,
+            start};
+  }
+  return {world.truth, std::move(coverage), radius_m, start};
+}
+
 void add_score(const Score& score, MissionResult& result) {
   result.coverage = score.coverage;
   result.t50_s = score.t50_s;
@@ -30,7 +40,9 @@ void add_score(const Score& score, MissionResult& result) {
   result.speed_std_mps = score.speed_std_mps;
   result.speed_max_mps = score.speed_max_mps;
   result.yaw_rate_max_radps = score.yaw_rate_max_radps;
-  result.collisions = static_cast<std::uint64_t>(score.collisions);
+  if (score.collisions) {
+    result.collisions = static_cast<std::uint64_t>(*score.collisions);
+  }
   result.min_clearance_m = score.min_clearance_m;
   result.explored_volume_m3 = score.explored_volume_m3;
   for (const VolumeAtTime& at : score.volume_over_time) {
@@ -65,6 +77,9 @@ Vector3d World::start_m() const {
 }
 
 std::shared_ptr<const CoverageTruth> World::coverage_truth() const {
+  if (!truth) {
+    return nullptr;
+  }
   const GridGeometry geometry(config.explorer.map.resolution_m, config.scene.box.box_m());
   return std::make_shared<const CoverageTruth>(*truth,
                                                geometry,
@@ -76,12 +91,7 @@ std::shared_ptr<const CoverageTruth> World::coverage_truth() const {
 MissionRecord::MissionRecord(const World& world,
                              std::shared_ptr<const CoverageTruth> coverage,
                              Time start)
-    : world_(world),
-      start_(start),
-      scorer_(world.truth,
-              std::move(coverage),
-              world.config.explorer.plan.vehicle_radius_m,
-              start) {}
+    : world_(world), start_(start), scorer_(make_scorer(world, std::move(coverage), start)) {}
 
 TickRow MissionRecord::on_frame(const MapSnapshot& map,
                                 const MissionStatus& status,
@@ -95,15 +105,17 @@ TickRow MissionRecord::on_frame(const MapSnapshot& map,
   row.yaw_rate_radps = (vehicle.world_from_body * vehicle.body_rates_radps).z();
   row.mode = to_string(status.mode);
   row.mission_state = to_string(status.state);
-  row.coverage = scorer_.coverage();
   row.explored_volume_m3 = scorer_.explored_volume_m3();
   row.clusters = status.clusters;
   row.trails = status.trails;
   row.dormant = status.dormant;
   row.target_id = status.target_id;
   row.target_m = status.target_m;
-  row.clearance_m =
-      world_.truth->distance_to_nearest_surface_m(vehicle.position_m, kClearanceShownM);
+  if (world_.truth) {
+    row.coverage = scorer_.coverage();
+    row.clearance_m =
+        world_.truth->distance_to_nearest_surface_m(vehicle.position_m, kClearanceShownM);
+  }
   mode_frames_[std::string(row.mode)] += 1.0;
   flown_frames_ += 1.0;
   return row;
@@ -137,26 +149,32 @@ void MissionRecord::write(const std::string& folder,
   const char* commit = std::getenv("UNDERSTORY_COMMIT");
   result.commit = commit == nullptr ? "" : commit;
   write_text_file((path / "config.yaml").string(), to_yaml(world_.config));
-  write_trunks((path / "trunks.csv").string(),
-               world_.truth->forest().trunks,
-               world_.config.scene.box.box_m());
+  if (world_.truth) {
+    write_trunks((path / "trunks.csv").string(),
+                 world_.truth->forest().trunks,
+                 world_.config.scene.box.box_m());
+  }
   result.topview = write_topview(map, (path / "topview.pgm").string());
   save_octomap(map, (path / "map.ot").string());
   write_result_json((path / "result.json").string(), result);
 }
 
 std::string summary_of(const MissionResult& result) {
+  std::string judged;
+  if (result.coverage && result.collisions) {
+    judged = fmt::format("coverage {:.2f} %, {} collisions, clearance {:.2f} m, ",
+                         100.0 * *result.coverage,
+                         *result.collisions,
+                         result.min_clearance_m.value_or(0.0));
+  }
   return fmt::format(
-      "{} after {:.1f} s ({}): coverage {:.2f} %, {:.0f} m at {:.2f} m/s, {} collisions, clearance "
-      "{:.2f} m, x{:.0f} real time, {:.0f} MB",
+      "{} after {:.1f} s ({}): {}{:.0f} m at {:.2f} m/s, x{:.0f} real time, {:.0f} MB",
       result.completed ? "completed" : "NOT completed",
       result.completion_time_s.value_or(result.mission_time_s),
       result.stop_reason,
-      100.0 * result.coverage,
+      judged,
       result.distance_m,
       result.speed_mean_mps,
-      result.collisions,
-      result.min_clearance_m.value_or(0.0),
       result.realtime_factor,
       result.peak_rss_mb);
 }

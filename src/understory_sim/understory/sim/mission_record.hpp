@@ -1,15 +1,17 @@
 // Copyright 2026 the Understory authors
 // SPDX-License-Identifier: BSD-3-Clause
 //
-// Follows a simulated flight and says what came of it: a row per frame, the result, the folder.
-// Both hosts keep one; the planner never sees what it knows. SI units, world frame; times in rows
-// and results count from `start`. One thread. Construction throws on wrong configuration, write()
-// when a file cannot be written; following a flight does not throw.
+// Follows a flight and says what came of it: a row per frame, the result, the folder. Both hosts
+// keep one; the planner never sees what it knows. On a real flight nothing is known of the truth.
+// SI units, world frame; times in rows and results count from `start`. One thread. Construction
+// throws on wrong configuration, write() when a file cannot be written; following a flight does not
+// throw.
 #pragma once
 
 #include <map>
 #include <memory>
 #include <string>
+#include <utility>
 
 #include "understory/mission_status.hpp"
 #include "understory/sim/forest_truth.hpp"
@@ -20,15 +22,16 @@
 namespace understory {
 
 // A simulated world: the forest that follows from configuration and seed, and the configuration
-// with box and start as the forest has them.
+// with box and start as the forest has them; or a real one, of which there is no truth.
 struct World {
   SimulationConfig config;
   std::uint64_t seed = 1;
   std::shared_ptr<const ForestTruth> truth;
 
   World(SimulationConfig wanted, std::uint64_t world_seed);
+  explicit World(SimulationConfig real) : config(std::move(real)) {}
   [[nodiscard]] Vector3d start_m() const;
-  // What of it can be seen; takes up to a few seconds.
+  // What of it can be seen; takes up to a few seconds. Null for a real one.
   [[nodiscard]] std::shared_ptr<const CoverageTruth> coverage_truth() const;
 };
 

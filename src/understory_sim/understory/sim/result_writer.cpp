@@ -178,7 +178,7 @@ std::string to_json(const MissionResult& result) {
   json["speed_std_mps"] = rounded(result.speed_std_mps);
   json["speed_max_mps"] = rounded(result.speed_max_mps);
   json["yaw_rate_max_radps"] = rounded(result.yaw_rate_max_radps);
-  json["collisions"] = result.collisions;
+  json["collisions"] = result.collisions ? Json(*result.collisions) : Json(nullptr);
   json["min_clearance_m"] = rounded(result.min_clearance_m);
   json["explored_volume_m3"] = rounded(result.explored_volume_m3);
   json["volume_at"] = Json::array();
@@ -282,8 +282,8 @@ void TickWriter::append(const TickRow& row) {
                  row.mode,
                  row.mission_state);
   fmt::format_to(out,
-                 "{:.6f},{:.3f},{},{},{},",
-                 row.coverage,
+                 "{},{:.3f},{},{},{},",
+                 row.coverage ? fmt::format("{:.6f}", *row.coverage) : "",
                  row.explored_volume_m3,
                  row.clusters,
                  row.trails,

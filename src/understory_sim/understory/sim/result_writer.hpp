@@ -52,11 +52,14 @@ struct VolumeAt {
 
 // Keys of result.json by the same names. What never happened is null there.
 struct MissionResult {
+  // Completed, and nothing is known to have been hit.
+  [[nodiscard]] bool is_good() const { return completed && collisions.value_or(0) == 0; }
+
   bool completed = false;
   std::string stop_reason;
   std::optional<double> completion_time_s;  // when the planner said "nothing left"
   double mission_time_s = 0.0;              // until landed or stopped
-  double coverage = 0.0;                    // 0 .. 1
+  std::optional<double> coverage;           // 0 .. 1; null on a real flight
   std::optional<double> t50_s;
   std::optional<double> t90_s;
   std::optional<double> t95_s;
@@ -66,8 +69,8 @@ struct MissionResult {
   double speed_std_mps = 0.0;
   double speed_max_mps = 0.0;
   double yaw_rate_max_radps = 0.0;
-  std::uint64_t collisions = 0;
-  std::optional<double> min_clearance_m;  // null in a forest without trunks
+  std::optional<std::uint64_t> collisions;  // null on a real flight
+  std::optional<double> min_clearance_m;    // null in a forest without trunks
   double explored_volume_m3 = 0.0;
   std::vector<VolumeAt> volume_at;           // at fixed times
   std::map<std::string, double> mode_share;  // of flight time, by mode
@@ -112,7 +115,7 @@ struct TickRow {
   double yaw_rate_radps = 0.0;
   std::string_view mode;           // a word
   std::string_view mission_state;  // a word
-  double coverage = 0.0;
+  std::optional<double> coverage;
   double explored_volume_m3 = 0.0;
   std::size_t clusters = 0;
   std::size_t trails = 0;

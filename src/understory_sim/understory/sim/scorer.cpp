@@ -42,13 +42,21 @@ Scorer::Scorer(std::shared_ptr<const ForestTruth> forest,
                Time start)
     : forest_(std::move(forest)),
       truth_(std::move(coverage)),
+      geometry_(truth_->geometry()),
       vehicle_radius_m_(vehicle_radius_m),
       start_(start),
-      tiles_(truth_->geometry().slot_count()),
+      tiles_(geometry_.slot_count()),
+      min_clearance_m_(kClearanceHorizonM) {}
+
+Scorer::Scorer(const GridGeometry& geometry, double vehicle_radius_m, Time start)
+    : geometry_(geometry),
+      vehicle_radius_m_(vehicle_radius_m),
+      start_(start),
+      tiles_(geometry_.slot_count()),
       min_clearance_m_(kClearanceHorizonM) {}
 
 void Scorer::on_map(const MapSnapshot& map) {
-  assert(map.geometry == truth_->geometry());
+  assert(map.geometry == geometry_);
   const double time_s = to_seconds(map.stamp - start_);
   record_volumes_before(time_s);
   const bool is_next = has_map_ && map.revision == last_revision_ + 1;
@@ -78,13 +86,14 @@ Scorer::TileCount Scorer::count(const Tile* tile, TileSlot slot) const {
   if (tile == nullptr) {
     return total;
   }
-  const VoxelBox inside = truth_->geometry().voxels_of_slot(slot);
-  const CoverageTruth::Rows& truth = truth_->rows(slot);
+  const VoxelBox inside = geometry_.voxels_of_slot(slot);
+  const CoverageTruth::Rows* truth = truth_ ? &truth_->rows(slot) : nullptr;
   const std::uint16_t columns = column_mask(inside);
   for (int z = inside.min.z(); z < inside.end.z(); ++z) {
     for (int y = inside.min.y(); y < inside.end.y(); ++y) {
       const std::size_t row = row_in_tile(y, z);
-      const unsigned covered = tile->free_rows[row] & truth[row];
+      const unsigned visible = truth == nullptr ? 0U : (*truth)[row];
+      const unsigned covered = tile->free_rows[row] & visible;
       const unsigned known = tile->known_rows[row] & columns;
       total.covered = static_cast<std::uint16_t>(total.covered + bits_of(covered));
       total.known = static_cast<std::uint16_t>(total.known + bits_of(known));
@@ -137,30 +146,39 @@ void Scorer::on_vehicle(Time time, const VehicleState& state) {
 }
 
 void Scorer::judge_clearance(const Vector3d& position_m) {
+  if (!forest_) {
+    return;
+  }
   // Nothing farther away than this can change the verdict, and a short search is a quick one.
   const double enough_m = std::max(min_clearance_m_, vehicle_radius_m_ + kContactReleaseM);
   const double clearance_m = forest_->distance_to_nearest_surface_m(position_m, enough_m);
   min_clearance_m_ = std::min(min_clearance_m_, clearance_m);
   if (!in_contact_ && clearance_m < vehicle_radius_m_) {
     in_contact_ = true;
-    ++score_.collisions;
+    ++collisions_;
   } else if (clearance_m >= vehicle_radius_m_ + kContactReleaseM) {
     in_contact_ = false;
   }
 }
 
 double Scorer::coverage() const {
-  return static_cast<double>(covered_voxels_) / static_cast<double>(truth_->voxel_count());
+  return truth_ ? static_cast<double>(covered_voxels_) / static_cast<double>(truth_->voxel_count())
+                : 0.0;
 }
 
 double Scorer::explored_volume_m3() const {
-  const double resolution_m = truth_->geometry().resolution_m();
+  const double resolution_m = geometry_.resolution_m();
   return static_cast<double>(known_voxels_) * resolution_m * resolution_m * resolution_m;
 }
 
 Score Scorer::score() const {
   Score score = score_;
-  score.coverage = coverage();
+  if (truth_) {
+    score.coverage = coverage();
+  }
+  if (forest_) {
+    score.collisions = collisions_;
+  }
   score.explored_volume_m3 = explored_volume_m3();
   if (flown_s_ > 0.0) {
     score.speed_mean_mps = speed_integral_ / flown_s_;

@@ -1,9 +1,10 @@
 // Copyright 2026 the Understory authors
 // SPDX-License-Identifier: BSD-3-Clause
 //
-// Judges a mission against the true world; knows nothing of the planner, which never sees it. SI
-// units, times since the mission's start. One thread. Nothing fails after construction; a map of
-// another geometry is a bug (assert).
+// Judges a mission against the true world; knows nothing of the planner, which never sees it. On a
+// real flight there is no truth: then only what was flown and mapped is counted. SI units, times
+// since the mission's start. One thread. Nothing fails after construction; a map of another
+// geometry is a bug (assert).
 #pragma once
 
 #include <cstddef>
@@ -26,7 +27,7 @@ struct VolumeAtTime {
 };
 
 struct Score {
-  double coverage = 0.0;  // 0 .. 1
+  std::optional<double> coverage;  // 0 .. 1
   std::optional<double> t50_s;
   std::optional<double> t90_s;
   std::optional<double> t95_s;
@@ -36,7 +37,7 @@ struct Score {
   double speed_std_mps = 0.0;
   double speed_max_mps = 0.0;
   double yaw_rate_max_radps = 0.0;             // of the heading, absolute
-  int collisions = 0;                          // contacts, however long each of them lasts
+  std::optional<int> collisions;               // contacts, however long each of them lasts
   std::optional<double> min_clearance_m;       // centre to surface; none if never within 10 m
   double explored_volume_m3 = 0.0;             // known voxels of the box
   std::vector<VolumeAtTime> volume_over_time;  // every 60 s
@@ -48,13 +49,15 @@ class Scorer {
          std::shared_ptr<const CoverageTruth> coverage,
          double vehicle_radius_m,
          Time start);
+  // Without truth.
+  Scorer(const GridGeometry& geometry, double vehicle_radius_m, Time start);
 
   // With every map, in order; only the tiles that changed since the last one are counted.
   void on_map(const MapSnapshot& map);
   // With every simulation step, in order.
   void on_vehicle(Time time, const VehicleState& state);
 
-  [[nodiscard]] double coverage() const;
+  [[nodiscard]] double coverage() const;  // 0 without truth
   [[nodiscard]] double explored_volume_m3() const;
   [[nodiscard]] Score score() const;
 
@@ -72,6 +75,7 @@ class Scorer {
 
   std::shared_ptr<const ForestTruth> forest_;
   std::shared_ptr<const CoverageTruth> truth_;
+  GridGeometry geometry_;
   double vehicle_radius_m_;
   Time start_;
 
@@ -90,6 +94,7 @@ class Scorer {
   double squared_speed_integral_ = 0.0;
   double min_clearance_m_;
   bool in_contact_ = false;
+  int collisions_ = 0;
   Score score_;  // what is settled so far
 };
 

@@ -103,8 +103,7 @@ int fly_one(const Options& options) {
   fmt::print("{}: {}\n",
              has_report ? "report" : "results",
              (fs::absolute(folder) / (has_report ? "report.html" : "")).string());
-  const bool is_good = result.completed && result.collisions == 0;
-  return is_good && (has_report || options.no_report) ? 0 : 1;
+  return result.is_good() && (has_report || options.no_report) ? 0 : 1;
 }
 
 int run_main(int argc, char** argv) {
