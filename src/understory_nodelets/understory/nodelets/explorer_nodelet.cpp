@@ -42,7 +42,8 @@ class ExplorerNodelet : public GuardedNodelet {
     advertise_service("return_home", Command::RETURN_HOME);
     advertise_service("land", Command::LAND);
     advertise_service("stop", Command::STOP);
-    watch_ = nh.createTimer(ros::Duration(0.25), [this](const ros::TimerEvent&) { watch(); });
+    watch_ = nh.createWallTimer(ros::WallDuration(0.25),
+                                [this](const ros::WallTimerEvent&) { watch(); });
   }
 
   void advertise_service(const char* name, std::uint8_t command) {
@@ -242,7 +243,7 @@ class ExplorerNodelet : public GuardedNodelet {
   ros::Subscriber map_subscriber_;
   ros::Subscriber command_subscriber_;
   std::vector<ros::ServiceServer> services_;
-  ros::Timer watch_;
+  ros::WallTimer watch_;
 };
 
 }  // namespace understory

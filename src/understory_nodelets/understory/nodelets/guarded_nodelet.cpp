@@ -33,8 +33,8 @@ void GuardedNodelet::onInit() {
     trace_publisher_ = nh.advertise<understory_msgs::Trace>("trace", 200);
     getPrivateNodeHandle().getParam("fail_after_calls", fail_after_calls_);
     start();
-    health_timer_ = nh.createTimer(ros::Duration(kHealthPeriodS),
-                                   [this](const ros::TimerEvent&) { publish_health(); });
+    health_timer_ = nh.createWallTimer(ros::WallDuration(kHealthPeriodS),
+                                       [this](const ros::WallTimerEvent&) { publish_health(); });
   } catch (const std::exception& error) {
     NODELET_FATAL("%s: %s", getName().c_str(), error.what());
     // The loader destroys the callback queues of a nodelet that fails before the nodelet itself.

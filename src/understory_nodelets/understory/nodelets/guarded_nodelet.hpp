@@ -56,7 +56,7 @@ class GuardedNodelet : public nodelet::Nodelet {
 
   ros::Publisher diagnostics_publisher_;
   ros::Publisher trace_publisher_;
-  ros::Timer health_timer_;
+  ros::WallTimer health_timer_;
   std::map<std::string, std::uint64_t> counters_;
   std::uint64_t failures_ = 0;
   std::uint64_t calls_ = 0;

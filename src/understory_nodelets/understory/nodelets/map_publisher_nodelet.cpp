@@ -79,8 +79,9 @@ class MapPublisherNodelet : public GuardedNodelet {
     binary_service_ = nh.advertiseService("octomap_binary", &MapPublisherNodelet::get_binary, this);
     full_service_ = nh.advertiseService("octomap_full", &MapPublisherNodelet::get_full, this);
     map_subscriber_ = nh.subscribe("map_updates", 1, &MapPublisherNodelet::on_map, this);
-    timer_ = nh.createTimer(ros::Duration(setup.onboard.publish.octomap_s),
-                            [this](const ros::TimerEvent&) { guarded([this] { publish(); }); });
+    timer_ =
+        nh.createWallTimer(ros::WallDuration(setup.onboard.publish.octomap_s),
+                           [this](const ros::WallTimerEvent&) { guarded([this] { publish(); }); });
   }
 
   void on_map(const MapUpdatePtr& update) {
@@ -153,7 +154,7 @@ class MapPublisherNodelet : public GuardedNodelet {
   ros::ServiceServer binary_service_;
   ros::ServiceServer full_service_;
   ros::Subscriber map_subscriber_;
-  ros::Timer timer_;
+  ros::WallTimer timer_;
 };
 
 }  // namespace understory

@@ -63,8 +63,9 @@ class RecorderNodelet : public GuardedNodelet {
     coverage_ = world_->coverage_truth();
     result_publisher_ = nh.advertise<understory_msgs::MissionResult>("result", 1);
     subscribe(nh);
-    timer_ = nh.createTimer(ros::Duration(0.25),
-                            [this](const ros::TimerEvent&) { guarded([this] { look(); }); });
+    timer_ = nh.createWallTimer(ros::WallDuration(0.25), [this](const ros::WallTimerEvent&) {
+      guarded([this] { look(); });
+    });
   }
 
   void subscribe(ros::NodeHandle& nh) {
@@ -147,7 +148,7 @@ class RecorderNodelet : public GuardedNodelet {
       over_since_ns_ = steady_ns();
     }
     const double over_s = static_cast<double>(steady_ns() - over_since_ns_) * 1e-9;
-    const bool is_still = status_->state == MissionState::kStopped && flight_.at_rest != 0 &&
+    const bool is_still = status_->state == MissionState::kStopped && status_->at_rest &&
                           vehicle_.velocity_mps.norm() < kStillMps;
     if ((status_->is_over() && (flight_.down != 0 || is_still || over_s > kSettleS)) ||
         silent_s > kSilenceS) {
@@ -207,7 +208,7 @@ class RecorderNodelet : public GuardedNodelet {
   ros::Subscriber flight_subscriber_;
   ros::Subscriber trace_subscriber_;
   ros::Subscriber timing_subscriber_;
-  ros::Timer timer_;
+  ros::WallTimer timer_;
 };
 
 }  // namespace understory
