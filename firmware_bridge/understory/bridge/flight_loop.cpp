@@ -89,8 +89,7 @@ struct FlightLoop::Mailboxes {
   // Of the flight thread.
   Plan plan;
   std::uint64_t sent_id = 0;
-  Setpoint hold;
-  bool has_hold = false;
+  std::optional<Setpoint> hold;
   bool has_landed_autopilot = false;
 };
 
@@ -132,9 +131,9 @@ void FlightLoop::settle(std::chrono::milliseconds at_most) const {
 }
 
 std::optional<FlightTick> FlightLoop::wait_for_tick(std::chrono::milliseconds at_most) {
-  FlightTick tick;
-  if (!mailboxes_->tick_arrived.wait(at_most) || !mailboxes_->ticks.pop(tick)) {
-    return std::nullopt;
+  std::optional<FlightTick> tick;
+  if (mailboxes_->tick_arrived.wait(at_most)) {
+    mailboxes_->ticks.consume_one([&tick](const FlightTick& next) { tick = next; });
   }
   return tick;
 }
@@ -166,17 +165,17 @@ void FlightLoop::turn(FlightTick& tick) {
     tick.is_first_of_trajectory = flown.id != boxes.sent_id;
     boxes.sent_id = flown.id;
   } else {
-    if (!boxes.has_hold) {
-      boxes.hold = hold_at(autopilot_->receive(now).state);
-      boxes.has_hold = true;
-    }
-    tick.setpoint = gate_.pass(boxes.hold, now);
+    const Setpoint hold = boxes.hold ? *boxes.hold : hold_at(autopilot_->receive(now).state);
+    tick.setpoint = gate_.pass(hold, now);
+    boxes.hold = tick.setpoint;
   }
   if (is_landing_ && !boxes.has_landed_autopilot) {
     autopilot_->land();
     boxes.has_landed_autopilot = true;
   }
-  autopilot_->send(tick.setpoint, now);
+  if (tick.setpoint) {
+    autopilot_->send(*tick.setpoint, now);
+  }
   tick.sent_ns = steady_ns();
   tick.telemetry = autopilot_->receive(now);
   tick.gate_violations = gate_.violations();

@@ -43,7 +43,7 @@ struct FlightTick {
   std::int64_t due_ns = 0;
   std::int64_t woken_ns = 0;
   std::int64_t sent_ns = 0;
-  Setpoint setpoint;
+  std::optional<Setpoint> setpoint;  // nothing was sent: the gate has let none through yet
   Telemetry telemetry;
   std::uint64_t trajectory_id = 0;  // 0: none yet
   Time depth_stamp{};               // of that trajectory

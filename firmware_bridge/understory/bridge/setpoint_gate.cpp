@@ -21,27 +21,28 @@ bool SetpointGate::is_acceptable(const Setpoint& setpoint, Time now) const {
       setpoint.acceleration_mps2.norm() > config_.max_acceleration_mps2) {
     return false;
   }
-  if (!has_last_) {
+  if (!last_) {
     return true;
   }
   // At most a second: after a longer silence nothing explains a jump any more.
   const double elapsed_s = std::clamp(to_seconds(now - last_time_), 0.0, 1.0);
-  const double step_m = (setpoint.position_m - last_.position_m).norm();
+  const double step_m = (setpoint.position_m - last_->position_m).norm();
   return step_m <= config_.max_step_m + config_.max_speed_mps * elapsed_s;
 }
 
-Setpoint SetpointGate::pass(const Setpoint& setpoint, Time now) {
+std::optional<Setpoint> SetpointGate::pass(const Setpoint& setpoint, Time now) {
   if (is_acceptable(setpoint, now)) {
-    has_last_ = true;
     last_ = setpoint;
     last_time_ = now;
     return setpoint;
   }
   ++violations_;
   last_time_ = now;  // holding on explains no jump either
-  last_.velocity_mps.setZero();
-  last_.acceleration_mps2.setZero();
-  last_.yaw_rate_radps = 0.0;
+  if (last_) {
+    last_->velocity_mps.setZero();
+    last_->acceleration_mps2.setZero();
+    last_->yaw_rate_radps = 0.0;
+  }
   return last_;
 }
 

@@ -2,12 +2,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
 // The last check before a setpoint leaves: finite, inside the fence, within speed, acceleration and
-// step limits. It shares no code with the planner. What does not pass is replaced by a hold at the
-// last good position and counted. World frame, SI units; the flight thread alone; no allocation,
-// cannot fail.
+// step limits. It shares no code with the planner. What does not pass is counted and replaced by a
+// hold at the last good position; before there is one, by nothing. World frame, SI units; the
+// flight thread alone; no allocation, cannot fail.
 #pragma once
 
 #include <cstdint>
+#include <optional>
 
 #include "understory/autopilot/control_law.hpp"
 #include "understory/base/config.hpp"
@@ -40,8 +41,8 @@ class SetpointGate {
  public:
   SetpointGate(const GateConfig& config, const Box3d& box_m);
 
-  // `setpoint` itself, or a hold.
-  [[nodiscard]] Setpoint pass(const Setpoint& setpoint, Time now);
+  // `setpoint` itself, or a hold; nothing where no setpoint was good yet.
+  [[nodiscard]] std::optional<Setpoint> pass(const Setpoint& setpoint, Time now);
 
   [[nodiscard]] std::uint64_t violations() const { return violations_; }
 
@@ -50,8 +51,7 @@ class SetpointGate {
 
   GateConfig config_;
   Box3d fence_m_;
-  bool has_last_ = false;
-  Setpoint last_;
+  std::optional<Setpoint> last_;
   Time last_time_{};
   std::uint64_t violations_ = 0;
 };
