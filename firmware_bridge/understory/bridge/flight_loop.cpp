@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cerrno>
 #include <ctime>
+#include <deque>
+#include <limits>
 
 #include <boost/lockfree/spsc_queue.hpp>
 #include <pthread.h>
@@ -17,6 +19,7 @@ namespace {
 constexpr std::int64_t kNanoseconds = 1'000'000'000;
 constexpr std::size_t kPlansInFlight = 64;
 constexpr std::size_t kTicksInFlight = 256;
+constexpr std::uint64_t kFlying = std::numeric_limits<std::uint64_t>::max();
 
 timespec to_timespec(std::int64_t nanoseconds) {
   return {static_cast<time_t>(nanoseconds / kNanoseconds),
@@ -76,18 +79,24 @@ std::int64_t steady_ns() {
   return now_ns(CLOCK_MONOTONIC);
 }
 
-using Plan = std::shared_ptr<const TrajectoryFollower>;
-
-// One writer and one reader each. Plans come back to the thread that made them, because freeing
-// memory is not for the flight thread.
+// One writer and one reader each. Plans belong to the thread that offers them, because freeing
+// memory is not for the flight thread: it gets pointers and tells how many it has taken; of those
+// only the last is still in use.
 struct FlightLoop::Mailboxes {
-  boost::lockfree::spsc_queue<Plan, boost::lockfree::capacity<kPlansInFlight>> to_fly;
-  boost::lockfree::spsc_queue<Plan, boost::lockfree::capacity<2 * kPlansInFlight>> flown;
+  boost::lockfree::spsc_queue<const TrajectoryFollower*, boost::lockfree::capacity<kPlansInFlight>>
+      to_fly;
   boost::lockfree::spsc_queue<FlightTick, boost::lockfree::capacity<kTicksInFlight>> ticks;
   Semaphore tick_arrived;
+  std::atomic<std::uint64_t> taken{0};
+  std::atomic<std::uint64_t> at_rest_after{0};  // so many plans; kFlying: not at rest
+
+  // Of the thread that offers.
+  std::deque<std::unique_ptr<const TrajectoryFollower>> plans;  // that may still be in use
+  std::uint64_t offered = 0;
 
   // Of the flight thread.
-  Plan plan;
+  const TrajectoryFollower* plan = nullptr;
+  std::uint64_t plan_count = 0;
   std::uint64_t sent_id = 0;
   std::optional<Setpoint> hold;
   bool has_landed_autopilot = false;
@@ -109,14 +118,17 @@ FlightLoop::~FlightLoop() {
 }
 
 void FlightLoop::offer(const TrajectoryPtr& trajectory, Time now) {
-  Plan freed;
-  while (mailboxes_->flown.pop(freed)) {
+  Mailboxes& boxes = *mailboxes_;
+  const std::uint64_t taken = boxes.taken;
+  while (boxes.offered - boxes.plans.size() + 1 < taken) {
+    boxes.plans.pop_front();
   }
   follower_.set(trajectory, now);
-  while (!mailboxes_->to_fly.push(std::make_shared<const TrajectoryFollower>(follower_))) {
+  boxes.plans.push_back(std::make_unique<const TrajectoryFollower>(follower_));
+  ++boxes.offered;
+  while (!boxes.to_fly.push(boxes.plans.back().get())) {
     std::this_thread::yield();  // full only if the flight thread has not run for many decisions
   }
-  is_at_rest_ = false;  // until a turn has seen it
 }
 
 void FlightLoop::land() {
@@ -125,7 +137,9 @@ void FlightLoop::land() {
 
 void FlightLoop::settle(std::chrono::milliseconds at_most) const {
   const auto until = std::chrono::steady_clock::now() + at_most;
-  while (!is_at_rest_ && std::chrono::steady_clock::now() < until) {
+  // At rest with an older plan does not count.
+  while (mailboxes_->at_rest_after != mailboxes_->offered &&
+         std::chrono::steady_clock::now() < until) {
     std::this_thread::sleep_for(std::chrono::milliseconds(5));
   }
 }
@@ -147,14 +161,10 @@ bool FlightLoop::become_real_time() const {
 
 void FlightLoop::turn(FlightTick& tick) {
   Mailboxes& boxes = *mailboxes_;
-  Plan next;
-  while (boxes.to_fly.pop(next)) {
-    if (boxes.plan) {
-      static_cast<void>(boxes.flown.push(boxes.plan));  // twice the room of what can be under way
-    }
-    boxes.plan.swap(next);
-    next.reset();
+  while (boxes.to_fly.pop(boxes.plan)) {
+    ++boxes.plan_count;
   }
+  boxes.taken = boxes.plan_count;
   const Time now = wall_time();
   if (boxes.plan) {
     const Trajectory& flown = boxes.plan->at(now);
@@ -179,8 +189,7 @@ void FlightLoop::turn(FlightTick& tick) {
   tick.sent_ns = steady_ns();
   tick.telemetry = autopilot_->receive(now);
   tick.gate_violations = gate_.violations();
-  // Not while a plan waits that this turn has not seen.
-  is_at_rest_ = tick.is_at_rest && boxes.to_fly.read_available() == 0;
+  boxes.at_rest_after = tick.is_at_rest ? boxes.plan_count : kFlying;
 }
 
 void FlightLoop::run() {

@@ -87,7 +87,6 @@ class FlightLoop {
   std::unique_ptr<Mailboxes> mailboxes_;
   std::atomic<bool> is_stopping_{false};
   std::atomic<bool> is_landing_{false};
-  std::atomic<bool> is_at_rest_{true};
   std::atomic<bool> is_real_time_{false};
   std::atomic<std::uint64_t> lost_ticks_{0};
   std::thread thread_;
