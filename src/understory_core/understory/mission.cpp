@@ -106,7 +106,7 @@ void Mission::end_exploration(StopReason reason, Time now) {
 // Null where the vehicle rests, or where there is no braking trajectory: then the flown one stands,
 // which ends at rest as well.
 TrajectoryPtr Mission::brake_if(bool is_needed, Time now) {
-  if (!is_needed || pilot_.is_at_rest(now)) {
+  if (!is_needed || !has_map_ || pilot_.is_at_rest(now)) {
     return nullptr;
   }
   const Result<TrajectoryPtr, PlanError> braked = pilot_.brake(now);
@@ -114,6 +114,9 @@ TrajectoryPtr Mission::brake_if(bool is_needed, Time now) {
 }
 
 TrajectoryPtr Mission::stop(StopReason reason, Time now) {
+  if (is_over()) {
+    return nullptr;
+  }
   TrajectoryPtr braking = brake_if(true, now);
   if (reason_ == StopReason::kNone) {
     end_exploration(reason, now);
@@ -153,6 +156,7 @@ Mission::Answer Mission::return_home(Time now) {
   if (reason_ == StopReason::kNone) {
     end_exploration(StopReason::kReturnRequested, now);
   }
+  resumptions_ = kMaxResumptions;  // whoever asks for the way home wants no more exploring
   failed_legs_ = 0;
   state_ = MissionState::kReturnHome;
   return {true, nullptr};  // the way home begins on what is flown
@@ -293,6 +297,7 @@ TrajectoryPtr Mission::descend(Time now) {
 MissionStep Mission::on_map(const MapSnapshotPtr& snapshot, Time now) {
   MissionStep step;
   pilot_.update_map(snapshot);
+  has_map_ = true;
   explorer_.observe(snapshot);
   const bool is_late = to_seconds(now - started_at_) >= config_.time_limit_s;
   if (reason_ == StopReason::kNone && state_ != MissionState::kWaiting && is_late) {

@@ -79,7 +79,7 @@ class Mission {
           Time now);
 
   MissionStep on_map(const MapSnapshotPtr& snapshot, Time now);
-  // Brakes, and stays where it is.
+  // Brakes, and stays where it is. Once it is over, nothing more happens.
   TrajectoryPtr stop(StopReason reason, Time now);
 
   // What an operator asks for. False: not now (start: it flies already; the others: it is over).
@@ -125,6 +125,7 @@ class Mission {
   Explorer explorer_;
   Vector3d home_m_;
   double home_yaw_rad_;
+  bool has_map_ = false;  // without one nothing but rest is flown
   MissionState state_;
   MissionState resumed_state_ = MissionState::kTakeOff;  // what follows on a pause
   StopReason reason_ = StopReason::kNone;
