@@ -194,5 +194,32 @@ TEST(Pilot, BrakeDropsWhatWasToFollow) {
   EXPECT_LT((pilot.follower().sample(at_s(60.0)).position_m - end_of(**braked)).norm(), 1e-9);
 }
 
+TEST(Pilot, WithdrawnTrajectoryIsAsIfItHadNeverBeenHandedOut) {
+  const MapSnapshotPtr map = open_room().build();
+  Pilot pilot = pilot_in(map);
+  const Result<TrajectoryPtr, PlanError> first = pilot.fly(goal_at(kStart_m, {3, 0, 1}), at_s(1.0));
+  ASSERT_TRUE(first.has_value());
+  const Time now = at_s(3.0);
+  const Vector3d next_m = pilot.next_start_point(now).position_m;
+  const Result<TrajectoryPtr, PlanError> late = pilot.fly(goal_at(next_m, {2, 3, 1}), now);
+  ASSERT_TRUE(late.has_value());
+
+  pilot.withdraw(*late);
+
+  EXPECT_EQ(pilot.follower().newest(), *first);
+  EXPECT_EQ(pilot.next_start_point(now).position_m, next_m);
+  EXPECT_LT((pilot.follower().sample(at_s(60.0)).position_m - Vector3d(3, 0, 1)).norm(), 1e-6);
+  expect_flown_safely(pilot, *map, now, 0.28);
+}
+
+TEST(Pilot, RestsOnWhenItsOnlyTrajectoryIsWithdrawn) {
+  Pilot pilot = pilot_in(open_room().build());
+
+  pilot.withdraw(pilot.follower().newest());
+
+  EXPECT_TRUE(pilot.is_at_rest(at_s(1.0)));
+  EXPECT_EQ(pilot.follower().sample(at_s(1.0)).position_m, kStart_m);
+}
+
 }  // namespace
 }  // namespace understory

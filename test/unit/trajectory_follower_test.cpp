@@ -77,5 +77,51 @@ TEST(TrajectoryFollower, WhatHasBeenFlownIsForgotten) {
   }
 }
 
+TEST(TrajectoryFollower, RemovedOneLeavesWhatWasFlownBefore) {
+  TrajectoryFollower follower;
+  const TrajectoryPtr second = rest(2, 2.0);
+  follower.set(rest(1, 0.0), at_s(0.0));
+  follower.set(second, at_s(1.0));
+
+  follower.remove(second);
+
+  EXPECT_EQ(follower.newest()->id, 1U);
+  EXPECT_EQ(follower.at(at_s(10.0)).id, 1U);
+}
+
+TEST(TrajectoryFollower, RemovingOneInBetweenKeepsThoseAround) {
+  TrajectoryFollower follower;
+  const TrajectoryPtr second = rest(2, 2.0);
+  follower.set(rest(1, 0.0), at_s(0.0));
+  follower.set(second, at_s(0.0));
+  follower.set(rest(3, 3.0), at_s(0.0));
+
+  follower.remove(second);
+
+  EXPECT_EQ(follower.at(at_s(2.5)).id, 1U);
+  EXPECT_EQ(follower.at(at_s(3.0)).id, 3U);
+}
+
+TEST(TrajectoryFollower, OnlyOneThereIsCannotBeRemoved) {
+  TrajectoryFollower follower;
+  const TrajectoryPtr only = rest(1, 0.0);
+  follower.set(only, at_s(0.0));
+
+  follower.remove(only);
+
+  ASSERT_FALSE(follower.empty());
+  EXPECT_EQ(follower.newest(), only);
+}
+
+TEST(TrajectoryFollower, RemovingWhatItDoesNotHaveChangesNothing) {
+  TrajectoryFollower follower;
+  follower.set(rest(1, 0.0), at_s(0.0));
+  follower.set(rest(2, 2.0), at_s(0.0));
+
+  follower.remove(rest(2, 2.0));  // an equal one, but not that one
+
+  EXPECT_EQ(follower.queue().size(), 2U);
+}
+
 }  // namespace
 }  // namespace understory
