@@ -7,7 +7,6 @@ Called by `understory test` once all packages are installed.
 
 import argparse
 import pathlib
-import re
 import subprocess
 import sys
 import time
@@ -15,7 +14,7 @@ import traceback
 
 import builds
 from catkin_check import check_catkin
-from commands import ROOT, cpp_files, say
+from commands import ROOT, say
 from python_tests import run_python_tests
 from results import SuiteResult, check_minimums, read_minimums, summary, totals
 from short_flight import flies
@@ -29,7 +28,6 @@ SANITIZER_ENV = {
     "LSAN_OPTIONS": f"suppressions={LEAKS_OF_LIBRARIES}:print_suppressions=0",
     "UBSAN_OPTIONS": "print_stacktrace=1",
 }
-THREADS = re.compile(r"^\s*#include <(thread|future|mutex|atomic|condition_variable|pthread\.h)>", re.M)
 
 
 def run_build_and_ctest(quick):
@@ -41,7 +39,7 @@ def run_build_and_ctest(quick):
     if folder is None:
         built.passed, built.failed = 0, ["build-test does not compile"]
         return None, [built]
-    say("\n== ctest: " + ("unit tests" if quick else "unit, bad input, property, scenario tests"))
+    say("\n== ctest: " + ("unit tests" if quick else "unit, thread, bad input, property, scenario tests"))
     return folder, [built] + guarded("ctest", builds.run_ctest, folder, "^unit$" if quick else "")
 
 
@@ -95,21 +93,12 @@ def run_sanitized():
 
 
 def run_thread_sanitized():
-    say("\n== tsan: unit tests under the thread sanitizer")
-    threaded = [
-        name
-        for name in cpp_files()
-        if not name.startswith("test/") and THREADS.search((ROOT / name).read_text("utf-8"))
-    ]
-    if not threaded:
-        say("  nothing to run: no file of ours uses threads, mutexes or atomics")
-        return []
-    say("  because of " + ", ".join(threaded))
+    say("\n== tsan: tests of what runs on threads, under the thread sanitizer")
     options = builds.SANITIZED + ["-DUNDERSTORY_SANITIZE=thread"]
-    folder = builds.build("build-tsan-test", options, ["understory_sanitized_tests"])
+    folder = builds.build("build-tsan-test", options, ["test_threads"])
     if folder is None:
-        return [SuiteResult("unit-tsan", failed=["build-tsan-test does not compile"])]
-    return builds.run_ctest(folder, "^unit$", "-tsan", {"TSAN_OPTIONS": "halt_on_error=1"})
+        return [SuiteResult("threads-tsan", failed=["build-tsan-test does not compile"])]
+    return builds.run_ctest(folder, "^threads$", "-tsan", {"TSAN_OPTIONS": "halt_on_error=1"})
 
 
 def guarded(name, suite, *arguments):
@@ -133,7 +122,7 @@ def run_all(quick):
         results += guarded("parameters", check_parameters, folder)
         results += guarded("clang-tidy", check_tidy, folder)
     results += guarded("unit-asan", run_sanitized)
-    results += guarded("unit-tsan", run_thread_sanitized)
+    results += guarded("threads-tsan", run_thread_sanitized)
     results += guarded("catkin", check_catkin)
     return results
 
