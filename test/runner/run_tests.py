@@ -17,6 +17,7 @@ from catkin_check import check_catkin
 from commands import ROOT, say
 from python_tests import run_python_tests
 from results import SuiteResult, check_minimums, read_minimums, summary, totals
+from ros_tests import run_ros_tests
 from short_flight import flies
 from static_checks import check_format, check_shell
 from tidy import check_tidy
@@ -124,6 +125,7 @@ def run_all(quick):
     results += guarded("unit-asan", run_sanitized)
     results += guarded("threads-tsan", run_thread_sanitized)
     results += guarded("catkin", check_catkin)
+    results += guarded("ros", run_ros_tests)
     return results
 
 

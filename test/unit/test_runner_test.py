@@ -12,6 +12,7 @@ sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "runner"))
 
 import builds  # noqa: E402
 import results  # noqa: E402
+import ros_tests  # noqa: E402
 from results import SuiteResult  # noqa: E402
 
 
@@ -56,6 +57,46 @@ class CountTest(unittest.TestCase):
         )
 
         self.assertEqual(result.failed, ["test_unit_NOT_BUILT"])
+
+
+def counted_file(xml_text):
+    """The SuiteResult after the report of one program of a .test file."""
+    result = SuiteResult("ros")
+    ros_tests.count_file(xml.etree.ElementTree.fromstring(xml_text), "topics", result)
+    return result
+
+
+class RosCountTest(unittest.TestCase):
+    def test_failures_and_errors_are_named_once(self):
+        result = counted_file(
+            '<testsuites><testsuite><testcase classname="A" name="b" status="run"/>'
+            '<testcase classname="A" name="c"><failure message="1"/><failure message="2"/>'
+            '</testcase><testcase classname="A" name="d"><error>no</error></testcase>'
+            "</testsuite></testsuites>"
+        )
+
+        self.assertEqual(result.passed, 1)
+        self.assertEqual(result.failed, ["topics: A.c", "topics: A.d"])
+
+    def test_a_skipped_test_carries_its_reason(self):
+        result = counted_file(
+            '<testsuite><testcase classname="A" name="b" status="run" result="skipped">'
+            '<skipped message="no&#x0A;camera"/></testcase></testsuite>'
+        )
+
+        self.assertEqual(result.skipped, [("topics: A.b", "no camera")])
+        self.assertEqual(result.ran, 0)
+
+    def test_a_program_that_reported_nothing_is_failed(self):
+        with tempfile.TemporaryDirectory() as folder:
+            (pathlib.Path(folder) / "rostest-topics.xml").write_text(
+                '<testsuite><testcase classname="rostest" name="testtopics">'
+                "<failure>time limit exceeded</failure></testcase></testsuite>"
+            )
+            result = SuiteResult("ros")
+
+            self.assertEqual(ros_tests.count_results(pathlib.Path(folder), "topics", result), 0)
+            self.assertEqual(result.failed, ["topics: rostest.testtopics"])
 
 
 class MinimumTest(unittest.TestCase):

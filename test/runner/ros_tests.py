@@ -1,0 +1,84 @@
+# Copyright 2026 the Understory authors
+# SPDX-License-Identifier: BSD-3-Clause
+"""The tests of the onboard host: every .test file of test/ros, each with a ROS master of its own."""
+
+import shutil
+import time
+import xml.etree.ElementTree
+
+from catkin_check import WORKSPACE, built_workspace
+from commands import ROOT, run_logged, say, show_log
+from results import SuiteResult
+
+FOLDER = ROOT / "test" / "ros"
+RESULTS = ROOT / "build-test" / "ros"
+# Tests have time limits of their own; this is for a rostest that hangs itself.
+TIMEOUT_S = 600
+
+
+def count_file(root, name, result):
+    """Adds what one program reported; GoogleTest and rosunit write alike."""
+    for case in root.iter("testcase"):
+        case_name = f"{name}: {case.get('classname', '')}.{case.get('name')}"
+        skipped = case.find("skipped")
+        bad = case.findall("failure") + case.findall("error")
+        if bad:
+            result.failed.append(case_name)
+            reasons = "\n".join(part.text or part.get("message", "") for part in bad)
+            say(f"\n-- FAILED: {case_name}\n{reasons}")
+        elif skipped is not None or case.get("status") == "notrun":
+            reason = skipped.get("message") if skipped is not None else "disabled"
+            result.skipped.append((case_name, " ".join((reason or "no reason given").split())))
+        else:
+            result.passed += 1
+
+
+def count_results(folder, name, result):
+    """Adds the results of one .test file; returns how many tests they tell of."""
+    before = result.ran + len(result.skipped)
+    for path in sorted(folder.rglob("rosunit-*.xml")):
+        count_file(xml.etree.ElementTree.parse(path).getroot(), name, result)
+    counted = result.ran + len(result.skipped) - before
+    # rostest's own report has a case per program: failed if it hung, died or reported nothing.
+    own = SuiteResult(name)
+    for path in folder.rglob("rostest-*.xml"):
+        count_file(xml.etree.ElementTree.parse(path).getroot(), name, own)
+    result.failed += own.failed
+    return counted
+
+
+def _run(test, result):
+    folder = RESULTS / test.stem
+    shutil.rmtree(folder, ignore_errors=True)
+    began = time.monotonic()
+    failures = len(result.failed)
+    status = run_logged(
+        ["timeout", "--kill-after=30", str(TIMEOUT_S), WORKSPACE / "devel" / "env.sh"]
+        + ["rostest", "--results-base-dir", folder, test],
+        folder / "rostest.log",
+        env={"ROS_HOME": str(folder / "home"), "ROS_HOSTNAME": "localhost"},
+    )
+    counted = count_results(folder, test.stem, result)
+    if counted == 0:
+        result.failed.append(f"{test.name} produced no results")
+    elif status != 0 and len(result.failed) == failures:
+        result.failed.append(f"{test.name}: rostest ended with status {status}")
+    if len(result.failed) > failures:
+        show_log(folder / "rostest.log")
+    say(f"  {test.stem}: {counted} tests, {time.monotonic() - began:.0f} s")
+
+
+def run_ros_tests():
+    say("\n== ros: the onboard host, as a process and in one, with rostest")
+    began = time.monotonic()
+    result = SuiteResult("ros")
+    if shutil.which("rostest") is None:
+        result.skipped.append(("ros", "rostest is not installed"))
+        return result
+    if built_workspace() is None:
+        result.failed.append("the workspace does not compile")
+        return result
+    for test in sorted(FOLDER.glob("*.test")):
+        _run(test, result)
+    result.duration_s = time.monotonic() - began
+    return result
