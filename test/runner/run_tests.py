@@ -13,8 +13,8 @@ import time
 import traceback
 
 import builds
-from catkin_check import check_catkin
-from commands import ROOT, say
+from catkin_check import built_workspace, check_catkin
+from commands import ROOT, cpp_files, say
 from python_tests import run_python_tests
 from results import SuiteResult, check_minimums, read_minimums, summary, totals
 from ros_tests import run_ros_tests
@@ -73,6 +73,13 @@ def check_parameters(folder):
     return result
 
 
+def run_tidy(folder):
+    """Of the plain build's files, and of those that only the catkin workspace compiles."""
+    say("\n== build: the catkin workspace")
+    workspace = built_workspace()
+    return check_tidy([folder] if workspace is None else [folder, workspace])
+
+
 def run_sanitized():
     say("\n== asan: unit and bad-input tests, a flight under address and undefined-behaviour sanitizers")
     options = builds.SANITIZED + ["-DUNDERSTORY_SANITIZE=address,undefined"]
@@ -121,7 +128,7 @@ def run_all(quick):
         return results
     if folder is not None:
         results += guarded("parameters", check_parameters, folder)
-        results += guarded("clang-tidy", check_tidy, folder)
+        results += guarded("clang-tidy", run_tidy, folder)
     results += guarded("unit-asan", run_sanitized)
     results += guarded("threads-tsan", run_thread_sanitized)
     results += guarded("catkin", check_catkin)

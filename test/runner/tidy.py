@@ -19,6 +19,7 @@ import time
 from commands import ROOT, cpp_files, our_files, output_of, say
 from results import SuiteResult
 
+COMMANDS = ROOT / "build-test" / "tidy"  # compile_commands.json of all folders in one
 CACHE = pathlib.Path(os.environ.get("UNDERSTORY_TIDY_CACHE", ROOT / "build" / "tidy-cache"))
 WARNINGS_OF_GCC_ONLY = "-Wno-unknown-warning-option"
 
@@ -54,10 +55,10 @@ def _key(entry, files, version_and_rules):
     return digest.hexdigest()
 
 
-def _look_at(folder, entry, key):
+def _look_at(entry, key):
     """Runs clang-tidy over one file; returns what it says, empty if clean."""
     outcome = subprocess.run(
-        ["clang-tidy", "-p", folder, "--quiet", f"--extra-arg={WARNINGS_OF_GCC_ONLY}"]
+        ["clang-tidy", "-p", COMMANDS, "--quiet", f"--extra-arg={WARNINGS_OF_GCC_ONLY}"]
         + [entry["file"]],
         cwd=ROOT,
         stdin=subprocess.DEVNULL,
@@ -73,13 +74,34 @@ def _look_at(folder, entry, key):
     return outcome.stdout + outcome.stderr
 
 
-def check_tidy(folder):
-    """One SuiteResult; `folder` holds a finished build with compile_commands.json."""
+def entries_of(folders):
+    """{path: compile command and folder}: each of our files once, of the first folder that has it.
+
+    The catkin workspace names files by its links to packages; theirs are the real paths here, so
+    that the rules of the folder they lie in hold for them.
+    """
+    found = {}
+    for folder in folders:
+        listed = json.loads((folder / "compile_commands.json").read_text(encoding="utf-8"))
+        for entry in listed:
+            path = os.path.realpath(entry["file"])
+            if path.startswith(f"{ROOT}/") and path not in found:
+                command = entry["command"].replace(entry["file"], path)
+                found[path] = {**entry, "file": path, "command": command, "folder": folder}
+    return found
+
+
+def check_tidy(folders):
+    """One SuiteResult; `folders` hold finished builds with compile_commands.json."""
     say("\n== clang-tidy: static analysis of all C++ files")
     began = time.monotonic()
     result = SuiteResult("clang-tidy")
-    entries = json.loads((folder / "compile_commands.json").read_text(encoding="utf-8"))
-    entries = [entry for entry in entries if entry["file"].startswith(f"{ROOT}/")]
+    entries = list(entries_of(folders).values())
+    COMMANDS.mkdir(parents=True, exist_ok=True)
+    wanted = ("directory", "command", "file")
+    (COMMANDS / "compile_commands.json").write_text(
+        json.dumps([{key: entry[key] for key in wanted} for entry in entries]), encoding="utf-8"
+    )
     compiled = {os.path.relpath(entry["file"], ROOT) for entry in entries}
     left_out = [name for name in cpp_files() if name.endswith(".cpp") and name not in compiled]
     result.failed += [f"{name} is compiled by no target" for name in left_out]
@@ -89,16 +111,18 @@ def check_tidy(folder):
         name + _content_hash(ROOT / name) for name in rules
     )
     CACHE.mkdir(parents=True, exist_ok=True)
-    included = _included_files(folder)
+    included = {folder: _included_files(folder) for folder in folders}
     keys = {
-        entry["file"]: _key(entry, included[_object_file(entry)], version_and_rules)
+        entry["file"]: _key(
+            entry, included[entry["folder"]][_object_file(entry)], version_and_rules
+        )
         for entry in entries
     }
     todo = [entry for entry in entries if not (CACHE / keys[entry["file"]]).exists()]
     say(f"  {len(entries) - len(todo)} files are as they were when found clean, {len(todo)} to do")
     with concurrent.futures.ThreadPoolExecutor(os.cpu_count() or 1) as pool:
         runs = {
-            pool.submit(_look_at, folder, entry, keys[entry["file"]]): entry for entry in todo
+            pool.submit(_look_at, entry, keys[entry["file"]]): entry for entry in todo
         }
         for done, run in enumerate(concurrent.futures.as_completed(runs), 1):
             name = os.path.relpath(runs[run]["file"], ROOT)

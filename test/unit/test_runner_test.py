@@ -2,10 +2,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The test command's own rules: what counts as passed, failed, skipped and vanished."""
 
+import json
 import pathlib
 import sys
 import tempfile
 import unittest
+import unittest.mock
 import xml.etree.ElementTree
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "runner"))
@@ -13,6 +15,7 @@ sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "runner"))
 import builds  # noqa: E402
 import results  # noqa: E402
 import ros_tests  # noqa: E402
+import tidy  # noqa: E402
 from results import SuiteResult  # noqa: E402
 
 
@@ -97,6 +100,28 @@ class RosCountTest(unittest.TestCase):
 
             self.assertEqual(ros_tests.count_results(pathlib.Path(folder), "topics", result), 0)
             self.assertEqual(result.failed, ["topics: rostest.testtopics"])
+
+
+class TidyEntriesTest(unittest.TestCase):
+    def test_files_behind_links_are_listed_once_by_their_real_paths(self):
+        with tempfile.TemporaryDirectory() as name:
+            root = pathlib.Path(name).resolve()
+            (root / "package").mkdir()
+            (root / "link").symlink_to("package")
+            listed = {"plain": [root / "package/a.cpp"]}
+            listed["catkin"] = [root / "link/a.cpp", root / "link/b.cpp", "/usr/src/c.cpp"]
+            for folder, files in listed.items():
+                (root / folder).mkdir()
+                entries = [{"directory": "/", "file": f"{f}", "command": f"c++ {f}"} for f in files]
+                (root / folder / "compile_commands.json").write_text(json.dumps(entries))
+
+            with unittest.mock.patch.object(tidy, "ROOT", root):
+                found = tidy.entries_of([root / "plain", root / "catkin"])
+
+            path = root / "package"
+            self.assertEqual(sorted(found), [f"{path}/a.cpp", f"{path}/b.cpp"])
+            self.assertEqual(found[f"{path}/a.cpp"]["folder"], root / "plain")
+            self.assertEqual(found[f"{path}/b.cpp"]["command"], f"c++ {path}/b.cpp")
 
 
 class MinimumTest(unittest.TestCase):
