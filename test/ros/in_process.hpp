@@ -49,6 +49,21 @@ class InProcess {
   bool is_loaded_ = true;
 };
 
+// Holds on to what arrives, so that no address comes twice.
+template <class Message>
+class Witness {
+ public:
+  explicit Witness(const std::string& topic)
+      : subscriber_(ros::NodeHandle().subscribe(topic, 100, &Witness::on_message, this)) {}
+
+  std::vector<boost::shared_ptr<const Message>> seen;
+
+ private:
+  void on_message(const boost::shared_ptr<const Message>& message) { seen.push_back(message); }
+
+  ros::Subscriber subscriber_;
+};
+
 inline int run_with_ros(int argc, char** argv, const char* node) {
   ros::init(argc, argv, node);
   ::testing::InitGoogleTest(&argc, argv);

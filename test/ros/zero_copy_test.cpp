@@ -21,21 +21,7 @@ namespace {
 
 using test::InProcess;
 using test::wait_until;
-
-// Holds on to what arrives, so that no address comes twice.
-template <class Message>
-class Witness {
- public:
-  explicit Witness(const std::string& topic)
-      : subscriber_(ros::NodeHandle().subscribe(topic, 100, &Witness::on_message, this)) {}
-
-  std::vector<boost::shared_ptr<const Message>> seen;
-
- private:
-  void on_message(const boost::shared_ptr<const Message>& message) { seen.push_back(message); }
-
-  ros::Subscriber subscriber_;
-};
+using test::Witness;
 
 template <class Message>
 class TwoWitnesses {

@@ -83,7 +83,7 @@ class DepthCloudNodelet : public GuardedNodelet {
     pcl_conversions::toPCL(image.header, cloud->header);
     auto info = boost::make_shared<sensor_msgs::CameraInfo>(
         to_camera_info(decimated(*camera_, config_.decimation)));
-    info->header = image.header;
+    info->header = pcl_conversions::fromPCL(cloud->header);  // the same stamp, in microseconds
     info_publisher_.publish(sensor_msgs::CameraInfoConstPtr(info));
     cloud_publisher_.publish(to_boost<Cloud>(cloud));
     trace("cloud", image.header.stamp, begin_ns);

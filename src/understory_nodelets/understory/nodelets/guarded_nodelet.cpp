@@ -8,6 +8,7 @@
 #include <understory_msgs/Trace.h>
 
 #include "understory/bridge/flight_loop.hpp"
+#include "understory/nodelets/conversions.hpp"
 
 namespace understory {
 namespace {
@@ -86,7 +87,8 @@ void GuardedNodelet::trace(const char* stage,
                            std::int64_t begin_ns,
                            std::int64_t end_ns) {
   auto mark = boost::make_shared<understory_msgs::Trace>();
-  mark->header.stamp = exposure;
+  // As clouds keep it, whole microseconds: one name per frame, whatever its driver's stamp.
+  mark->header.stamp = to_ros(to_time(exposure));
   mark->stage = stage;
   mark->begin_ns = static_cast<std::uint64_t>(begin_ns);
   mark->end_ns = static_cast<std::uint64_t>(end_ns);
