@@ -81,6 +81,7 @@ struct Serializer<understory::MapUpdate> {
     update.is_whole = update.arrived.is_whole != 0;
   }
   // Off the fast path: only for subscribers in other processes.
+  // NOLINTNEXTLINE(readability-identifier-naming): roscpp's name
   static std::uint32_t serializedLength(const understory::MapUpdate& update) {
     return serializationLength(understory::to_msg(update));
   }

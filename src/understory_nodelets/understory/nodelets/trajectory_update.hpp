@@ -62,6 +62,7 @@ struct Serializer<understory::TrajectoryUpdate> {
     update.header = msg.header;
     update.trajectory = understory::from_msg(msg);
   }
+  // NOLINTNEXTLINE(readability-identifier-naming): roscpp's name
   static std::uint32_t serializedLength(const understory::TrajectoryUpdate& update) {
     return serializationLength(understory::to_msg(update));
   }
