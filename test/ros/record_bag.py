@@ -35,9 +35,9 @@ class RecordBag(unittest.TestCase):
                 recorded = {topic: [] for topic in TOPICS}
                 for topic, message, _ in bag.read_messages():
                     recorded[topic].append(message)
-                types = {topic: about.msg_type for topic, about in bag.get_type_and_topic_info()[1].items()}
+                about = bag.get_type_and_topic_info().topics
 
-        self.assertEqual(types[TOPICS[2]], "sensor_msgs/PointCloud2")
+        self.assertEqual(about[TOPICS[2]].msg_type, "sensor_msgs/PointCloud2")
         for topic, messages in recorded.items():
             self.assertGreaterEqual(len(messages), LEAST_FRAMES, topic)
             stamps = [message.header.stamp for message in messages]

@@ -62,10 +62,11 @@ class SeeTwo(unittest.TestCase):
             told_m = numpy.array((transform.x, transform.y, transform.z))
             self.assertLess(numpy.abs(told_m - position_m(newest)).max(), 1e-6)
         listener.unregister()
-        wanted = {f"{name}/{frame}" for name in VEHICLES for frame in ("base_link", "camera_optical")}
+        frames = ("base_link", "camera_optical")
+        wanted = {f"{name}/{frame}" for name in VEHICLES for frame in frames}
         seen = set(buffer.all_frames_as_yaml().replace(":", " ").split())
         self.assertTrue(wanted <= seen, seen)
-        self.assertFalse({"base_link", "camera_optical"} & seen, seen)
+        self.assertFalse(set(frames) & seen, seen)
 
 
 if __name__ == "__main__":

@@ -1,6 +1,6 @@
 # Copyright 2026 the Understory authors
 # SPDX-License-Identifier: BSD-3-Clause
-"""The tests of the onboard host: every .test file of test/ros, each with a ROS master of its own."""
+"""The tests of the onboard host: every .test file of test/ros, each with its own ROS master."""
 
 import shutil
 import time
