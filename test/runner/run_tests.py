@@ -44,15 +44,11 @@ def run_build_and_ctest(quick):
     return folder, [built] + guarded("ctest", builds.run_ctest, folder, "^unit$" if quick else "")
 
 
-def check_parameters(folder):
-    """docs/parameters.md must be what the program prints."""
-    say("\n== parameters: docs/parameters.md is current")
-    result = SuiteResult("parameters")
-    program = folder / "src/understory_sim/understory_simulate"
-    page = ROOT / "docs/parameters.md"
+def check_page(result, program, page, command):
+    """`page` must be what the program prints as its parameters."""
     if not program.exists():
         result.failed.append(f"{program} was not built")
-        return result
+        return
     printed = subprocess.run(
         [program, "--print-parameters"],
         stdin=subprocess.DEVNULL,
@@ -61,15 +57,30 @@ def check_parameters(folder):
         timeout=60,
         check=False,
     )
+    path = ROOT / page
     if printed.returncode != 0 or not printed.stdout.strip():
-        result.failed.append(f"--print-parameters failed: {printed.stderr.strip()}")
-    elif not page.exists() or page.read_text(encoding="utf-8") != printed.stdout:
+        result.failed.append(f"{program.name} --print-parameters failed: {printed.stderr.strip()}")
+    elif not path.exists() or path.read_text(encoding="utf-8") != printed.stdout:
         result.failed.append(
-            "docs/parameters.md is not current; write it anew with"
-            " `./understory simulate --print-parameters > docs/parameters.md`"
+            f"{page} is not current; write it anew with `{command} --print-parameters > {page}`"
         )
     else:
-        result.passed = 1
+        result.passed += 1
+
+
+def check_parameters(folder):
+    say("\n== parameters: docs/parameters.md and docs/onboard_parameters.md are current")
+    result = SuiteResult("parameters")
+    simulate = folder / "src/understory_sim/understory_simulate"
+    check_page(result, simulate, "docs/parameters.md", "./understory simulate")
+    workspace = built_workspace()
+    if workspace is None:
+        result.failed.append("the workspace does not compile")
+    else:
+        onboard = workspace.parent / "devel/lib/understory_nodelets/onboard"
+        check_page(
+            result, onboard, "docs/onboard_parameters.md", "rosrun understory_nodelets onboard"
+        )
     return result
 
 

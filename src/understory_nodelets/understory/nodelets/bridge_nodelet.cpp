@@ -113,6 +113,7 @@ class BridgeNodelet : public GuardedNodelet {
   }
 
   void publish(const FlightTick& tick) {
+    gate_violations_ = tick.gate_violations;
     timing_.due_ns.push_back(static_cast<std::uint64_t>(tick.due_ns));
     timing_.woken_ns.push_back(static_cast<std::uint64_t>(tick.woken_ns));
     if (tick.is_first_of_trajectory && tick.depth_stamp != Time{}) {
@@ -179,6 +180,10 @@ class BridgeNodelet : public GuardedNodelet {
   }
 
   [[nodiscard]] Health health() override {
+    if (gate_violations_ > 0) {
+      return {diagnostic_msgs::DiagnosticStatus::ERROR,
+              "the gate refused " + std::to_string(gate_violations_) + " setpoints and held"};
+    }
     if (!flight_->is_real_time() || !is_locked_) {
       return {diagnostic_msgs::DiagnosticStatus::WARN,
               "flight thread without real-time priority or locked memory"};
@@ -192,6 +197,7 @@ class BridgeNodelet : public GuardedNodelet {
   std::thread telemetry_thread_;
   std::atomic<bool> is_stopping_{false};
   std::atomic<std::int64_t> published_ns_{0};
+  std::atomic<std::uint64_t> gate_violations_{0};
   // Of the telemetry thread.
   tf2_ros::TransformBroadcaster broadcaster_;
   understory_msgs::FlightTiming timing_;

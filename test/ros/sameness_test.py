@@ -1,0 +1,84 @@
+#!/usr/bin/python3
+# Copyright 2026 the Understory authors
+# SPDX-License-Identifier: BSD-3-Clause
+"""One scenario in lockstep and onboard: both complete, in times that agree within 15 %.
+
+The two cannot agree exactly: onboard, exposures fall on the 100 Hz grid of the odometry, decisions
+take time, and threads run in another order each time, so targets differ after a few seconds. One
+onboard flight scatters by several percent; where the first one is outside, a second one joins the
+mean.
+"""
+
+import json
+import os
+import shutil
+import subprocess
+import tempfile
+import unittest
+from pathlib import Path
+
+import rospy
+import rostest
+
+SCENARIO = "small"
+TOLERANCE = 0.15
+ROOT = Path(__file__).resolve().parents[2]
+
+
+def program(package, name):
+    found = subprocess.run(
+        ["catkin_find", "--first-only", package, name],
+        check=True,
+        stdout=subprocess.PIPE,
+        encoding="utf-8",
+    )
+    return found.stdout.strip()
+
+
+def result_of(command, folder):
+    outcome = subprocess.run(command, check=False, env={**os.environ, "UNDERSTORY_ROOT": str(ROOT)})
+    result = json.loads((folder / "result.json").read_text(encoding="utf-8"))
+    return outcome.returncode, result
+
+
+class Sameness(unittest.TestCase):
+    def setUp(self):
+        self.folder = Path(tempfile.mkdtemp(prefix="understory_sameness_"))
+        self.addCleanup(shutil.rmtree, self.folder, True)
+
+    def completed(self, command, folder):
+        status, result = result_of([*command], folder)
+        self.assertEqual(status, 0, result["stop_reason"])
+        self.assertTrue(result["completed"])
+        self.assertEqual(result["collisions"], 0)
+        self.assertGreaterEqual(result["coverage"], 0.99)
+        return result["completion_time_s"]
+
+    def in_lockstep(self):
+        folder = self.folder / "lockstep"
+        command = [program("understory_sim", "understory_simulate"), "--scenario", SCENARIO]
+        return self.completed(
+            command + ["--quiet", "--no-report", "--out", str(folder)], folder
+        )
+
+    def onboard(self, number):
+        folder = self.folder / f"onboard_{number}"
+        folder.mkdir()
+        command = [program("understory_nodelets", "onboard"), "--scenario", SCENARIO]
+        return self.completed(command + ["--result-folder", str(folder)], folder)
+
+    def test_completion_times_agree(self):
+        lockstep_s = self.in_lockstep()
+        times_s = [self.onboard(1)]
+        if abs(times_s[0] / lockstep_s - 1.0) > TOLERANCE:
+            times_s.append(self.onboard(2))
+
+        mean_s = sum(times_s) / len(times_s)
+
+        print(f"lockstep {lockstep_s:.1f} s, onboard {times_s} s, ratio {mean_s / lockstep_s:.3f}")
+        self.assertLessEqual(abs(mean_s / lockstep_s - 1.0), TOLERANCE)
+
+
+if __name__ == "__main__":
+    rospy.init_node("sameness_test", disable_signals=True)
+    rostest.rosrun("understory_ros_test", "sameness", Sameness)
