@@ -25,9 +25,9 @@ class MapFileError : public std::runtime_error {
 // replaced only once the new one is complete.
 void save_octomap(const MapSnapshot& map, const std::string& path);
 
-// The tree alone, as `octomap_msgs/Octomap` carries it in `data`: with every log-odds (as in `.ot`),
-// or only whether voxels are free (`is_binary`, as in `.bt`). Throws MapFileError for a box that
-// an OctoMap cannot hold.
+// The tree alone, as `octomap_msgs/Octomap` carries it in `data`: with every log-odds (as in
+// `.ot`), or only whether voxels are free (`is_binary`, as in `.bt`). Throws MapFileError for a box
+// that an OctoMap cannot hold.
 [[nodiscard]] std::string octomap_tree(const MapSnapshot& map, bool is_binary);
 
 // For Mapper(MapSnapshot) to go on from. Log-odds of other makers are rounded to our units and
