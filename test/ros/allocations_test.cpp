@@ -166,7 +166,7 @@ TEST(Allocations, AFrameTakesLessThanACopyOfItsImage) {
   std::size_t changed_tiles = 0;
   for (int frame = 0; frame < kWarmUpFrames + kFrames; ++frame) {
     const sensor_msgs::ImageConstPtr image = driver.prepare(frame);
-    ASSERT_EQ(image->data.size(), std::size_t{640 * 480 * 4});
+    ASSERT_EQ(image->data.size(), std::size_t{640} * 480 * 4);
     if (frame == kWarmUpFrames) {
       g_largest = 0;
     }

@@ -65,7 +65,7 @@ TEST(FillCloud, PutsEveryPointOnTheRayOfItsPixel) {
       fill_cloud(image_of(enc::TYPE_32FC1.c_str(), 2.0F, 12), camera, CloudConfig(), cloud);
 
   ASSERT_TRUE(measured);
-  EXPECT_EQ(*measured, std::size_t{kWidth * kHeight});
+  EXPECT_EQ(*measured, std::size_t{kWidth} * kHeight);
   ASSERT_EQ(cloud.width, static_cast<std::uint32_t>(kWidth));
   ASSERT_EQ(cloud.height, static_cast<std::uint32_t>(kHeight));
   for (int v = 0; v < kHeight; ++v) {
@@ -85,7 +85,7 @@ TEST(FillCloud, ReadsMillimetres) {
     const auto measured = fill_cloud(image, small_camera(), CloudConfig(), cloud);
 
     ASSERT_TRUE(measured);
-    EXPECT_EQ(*measured, std::size_t{kWidth * kHeight - 1});
+    EXPECT_EQ(*measured, std::size_t{kWidth} * kHeight - 1U);
     EXPECT_FLOAT_EQ(cloud.at(7, 7).z, 1.234F);
     EXPECT_TRUE(std::isnan(cloud.at(3, 4).x) && std::isnan(cloud.at(3, 4).z));
     expect_on_ray(cloud.at(7, 7), small_camera(), 7, 7);
@@ -105,7 +105,7 @@ TEST(FillCloud, TellsNoMeasurementFromNoReturn) {
   const auto measured = fill_cloud(image, small_camera(), CloudConfig(), cloud);
 
   ASSERT_TRUE(measured);
-  EXPECT_EQ(*measured, std::size_t{kWidth * kHeight - 5});
+  EXPECT_EQ(*measured, std::size_t{kWidth} * kHeight - 5U);
   for (int u = 1; u <= 5; ++u) {
     EXPECT_TRUE(std::isnan(cloud.at(u, 1).z)) << u;
   }

@@ -49,6 +49,13 @@ class DepthCloudOfNanoseconds : public ::testing::Test {
     }));
   }
 
+  [[nodiscard]] ros::Time cloud_stamp() const {
+    return pcl_conversions::fromPCL(clouds_.seen[0]->header.stamp);
+  }
+  [[nodiscard]] const sensor_msgs::CameraInfo& info() const { return *infos_.seen[0]; }
+  [[nodiscard]] const understory_msgs::Trace& trace() const { return *traces_.seen[0]; }
+
+ private:
   InProcess nodelets_{{"DepthCloud"}};
   Witness<Cloud> clouds_{"camera/depth/points"};
   Witness<sensor_msgs::CameraInfo> infos_{"camera/depth/points_info"};
@@ -58,12 +65,12 @@ class DepthCloudOfNanoseconds : public ::testing::Test {
 };
 
 TEST_F(DepthCloudOfNanoseconds, InfoHasTheStampOfItsCloud) {
-  EXPECT_EQ(infos_.seen[0]->header.stamp, pcl_conversions::fromPCL(clouds_.seen[0]->header.stamp));
+  EXPECT_EQ(info().header.stamp, cloud_stamp());
 }
 
 TEST_F(DepthCloudOfNanoseconds, TracesOfAFrameHaveTheStampOfItsCloud) {
-  EXPECT_EQ(traces_.seen[0]->stage, "cloud");
-  EXPECT_EQ(traces_.seen[0]->header.stamp, pcl_conversions::fromPCL(clouds_.seen[0]->header.stamp));
+  EXPECT_EQ(trace().stage, "cloud");
+  EXPECT_EQ(trace().header.stamp, cloud_stamp());
 }
 
 }  // namespace

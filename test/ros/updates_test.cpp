@@ -35,7 +35,7 @@ class Flight {
     camera.width_px = 64;
     camera.height_px = 48;
     camera_ = CameraModel(camera);
-    depth_m_.assign(64U * 48U, 2.0F);
+    depth_m_.assign(std::size_t{64} * 48, 2.0F);
   }
 
   MapUpdate next(bool is_whole) {
@@ -47,7 +47,7 @@ class Flight {
     EXPECT_TRUE(mapper_.integrate(camera_, view, world_from_optical, exposure));
     MapUpdate update;
     update.header.frame_id = "map";
-    update.header.stamp.fromNSec(static_cast<std::uint64_t>(100000000 * frames_));
+    update.header.stamp.fromNSec(100000000U * static_cast<std::uint64_t>(frames_));
     update.is_whole = is_whole;
     update.map = mapper_.publish();
     return update;
