@@ -147,6 +147,7 @@ class FileTest(unittest.TestCase):
     def test_every_package_has_its_link_in_the_catkin_workspace(self):
         packages = {path.parent for path in ROOT.glob("*/package.xml")}
         packages |= {path.parent for path in ROOT.glob("src/*/package.xml")}
+        packages |= {path.parent for path in ROOT.glob("test/*/package.xml")}
 
         links = {link: os.readlink(link) for link in (ROOT / "catkin_ws/src").iterdir()}
         links = {link: to for link, to in links.items() if link.name != "CMakeLists.txt"}

@@ -33,7 +33,7 @@ std::uint64_t seed_parameter(const ros::NodeHandle& nh) {
 
 // In an install space the folder lies within the package's share, in the project it is the package.
 std::string find_config_folder(const ros::NodeHandle& nh) {
-  const std::string given = text_parameter(nh, "config_folder");
+  std::string given = text_parameter(nh, "config_folder");
   if (!given.empty()) {
     return given;
   }

@@ -143,7 +143,7 @@ class MapperNodelet : public GuardedNodelet {
     update->header.frame_id = onboard_.frames.map;
     update->map = mapper_->publish();
     const auto every = static_cast<std::uint64_t>(onboard_.publish.whole_map_every);
-    update->is_whole = update->map->revision % every == 0;
+    update->is_whole = update->map->revision == 1 || update->map->revision % every == 0;
     publisher_.publish(MapUpdatePtr(update));
     trace("map", stamp, begin_ns);
     count("updates");

@@ -21,8 +21,8 @@ namespace understory {
 class MonitorNodelet : public GuardedNodelet {
  private:
   struct Link {
-    const char* name;
-    double patience_s;
+    const char* name = "";
+    double patience_s = 0.0;
     std::int64_t last_ns = 0;
     std::uint64_t messages = 0;
 
@@ -70,8 +70,10 @@ class MonitorNodelet : public GuardedNodelet {
     if (silent.empty()) {
       return {};
     }
-    return {was_heard ? DiagnosticStatus::ERROR : DiagnosticStatus::WARN,
-            (was_heard ? "silent: " : "not yet heard: ") + silent};
+    Health found;
+    found.level = was_heard ? DiagnosticStatus::ERROR : DiagnosticStatus::WARN;
+    found.message = (was_heard ? "silent: " : "not yet heard: ") + silent;
+    return found;
   }
 
   Link odometry_{"odometry", 0.5};
