@@ -1,14 +1,16 @@
 // Copyright 2026 the Understory authors
 // SPDX-License-Identifier: BSD-3-Clause
 //
-// The mission. In: map_updates, odometry (where the vehicle starts), command. Out: trajectory,
-// status, and to look at: markers, planned_path. Services start, pause, return_home, land, stop.
-// A stage that fails, or no map for too long, ends the mission with the vehicle at rest.
+// The mission. In: map_updates, odometry (where the vehicle starts), command, flight_status. Out:
+// trajectory, status, and to look at: markers, planned_path. Services start, pause, return_home,
+// land, stop. A stage that fails, or no map for too long, ends the mission with the vehicle at
+// rest.
 #include <memory>
 
 #include <nav_msgs/Path.h>
 #include <pluginlib/class_list_macros.hpp>
 #include <std_srvs/Trigger.h>
+#include <understory_msgs/FlightStatus.h>
 #include <understory_msgs/MissionCommand.h>
 
 #include "understory/nodelets/conversions.hpp"
@@ -36,6 +38,7 @@ class ExplorerNodelet : public GuardedNodelet {
     const ros::TransportHints hints = ros::TransportHints().tcpNoDelay();
     odometry_subscriber_ = nh.subscribe("odometry", 1, &ExplorerNodelet::on_odometry, this, hints);
     map_subscriber_ = nh.subscribe("map_updates", 1, &ExplorerNodelet::on_map, this, hints);
+    flight_subscriber_ = nh.subscribe("flight_status", 1, &ExplorerNodelet::on_flight, this);
     command_subscriber_ = nh.subscribe("command", 10, &ExplorerNodelet::on_command, this);
     advertise_service("start", Command::START);
     advertise_service("pause", Command::PAUSE);
@@ -75,7 +78,18 @@ class ExplorerNodelet : public GuardedNodelet {
     guarded([&] { static_cast<void>(obey(command->command)); });
   }
 
-  void on_failure() override {
+  // From then on the vehicle holds and is not where the mission takes it to be.
+  void on_flight(const understory_msgs::FlightStatusConstPtr& flight) {
+    if (flight->gate_violations > 0 && !has_failed_) {
+      NODELET_ERROR("%s: the bridge's gate refused a setpoint: the mission ends here",
+                    getName().c_str());
+      guarded([this] { fail(); });
+    }
+  }
+
+  void on_failure() override { fail(); }
+
+  void fail() {
     if (!mission_ || has_failed_) {
       return;
     }
@@ -242,6 +256,7 @@ class ExplorerNodelet : public GuardedNodelet {
   ros::Subscriber odometry_subscriber_;
   ros::Subscriber map_subscriber_;
   ros::Subscriber command_subscriber_;
+  ros::Subscriber flight_subscriber_;
   std::vector<ros::ServiceServer> services_;
   ros::WallTimer watch_;
 };

@@ -86,6 +86,7 @@ void GuardedNodelet::trace(const char* stage,
                            const ros::Time& exposure,
                            std::int64_t begin_ns,
                            std::int64_t end_ns) {
+  const std::int64_t began_ns = steady_ns();
   auto mark = boost::make_shared<understory_msgs::Trace>();
   // As clouds keep it, whole microseconds: one name per frame, whatever its driver's stamp.
   mark->header.stamp = to_ros(to_time(exposure));
@@ -93,6 +94,7 @@ void GuardedNodelet::trace(const char* stage,
   mark->begin_ns = static_cast<std::uint64_t>(begin_ns);
   mark->end_ns = static_cast<std::uint64_t>(end_ns);
   trace_publisher_.publish(understory_msgs::TraceConstPtr(mark));
+  tracing_ns_ += steady_ns() - began_ns;
 }
 
 void GuardedNodelet::publish_health() {
@@ -114,6 +116,7 @@ void GuardedNodelet::publish_health() {
   for (const auto& [name, value] : counters_) {
     status.values.push_back(key_value(name, std::to_string(value)));
   }
+  status.values.push_back(key_value("tracing_us", std::to_string(tracing_ns_ / 1000)));
   status.values.push_back(key_value("failures", std::to_string(failures_)));
   array->status.push_back(status);
   diagnostics_publisher_.publish(diagnostic_msgs::DiagnosticArrayConstPtr(array));

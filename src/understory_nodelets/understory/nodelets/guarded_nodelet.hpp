@@ -8,6 +8,7 @@
 // health().
 #pragma once
 
+#include <atomic>
 #include <cstdint>
 #include <functional>
 #include <map>
@@ -60,6 +61,7 @@ class GuardedNodelet : public nodelet::Nodelet {
   std::map<std::string, std::uint64_t> counters_;
   std::uint64_t failures_ = 0;
   std::uint64_t calls_ = 0;
+  std::atomic<std::int64_t> tracing_ns_{0};  // what the marks themselves cost
   int fail_after_calls_ = 0;  // fault injection for tests: parameter ~fail_after_calls
   std::string last_failure_;
   std::string last_skip_;  // since the last diagnostics

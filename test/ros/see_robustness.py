@@ -20,11 +20,11 @@ import rosbag
 import rospy
 import rostest
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
-from geometry_msgs.msg import TransformStamped
+from geometry_msgs.msg import Point, TransformStamped
 from nodelet.srv import NodeletUnload
 from sensor_msgs.msg import CameraInfo, Image
 from tf2_msgs.msg import TFMessage
-from understory_msgs.msg import MissionStatus
+from understory_msgs.msg import MissionStatus, Trajectory
 
 FLY = Path(__file__).resolve().parents[2] / "src/understory_nodelets/onboard/fly.py"
 AIRBORNE_S = 6.0  # into the flight; by then it has flown metres
@@ -123,11 +123,11 @@ class Robustness(unittest.TestCase):
         rospy.set_param(name, value)
         self.addCleanup(rospy.delete_param, name)
 
-    def assert_at_rest_with_results(self, flight, stop_reason):
+    def assert_at_rest_with_results(self, flight, stop_reason, is_gate_silent=True):
         result = flight.result()
         self.assertEqual(result["stop_reason"], stop_reason)
         self.assertEqual(result["collisions"], 0)
-        self.assertEqual(result["counters"]["gate_violations"], 0)
+        self.assertEqual(result["counters"]["gate_violations"] == 0, is_gate_silent)
         self.assertGreater(result["distance_m"], 1.0, "it never flew")
         tick = flight.last_tick()
         self.assertLess(float(tick["speed_mps"]), 0.05)
@@ -281,6 +281,22 @@ class Robustness(unittest.TestCase):
         self.assertEqual(result["stop_reason"], "interrupted")
         self.assertEqual(result["collisions"], 0)
 
+    def test_a_trajectory_that_jumps_is_held_by_the_gate(self):
+        flight = self.fly()
+        flight.wait_airborne()
+        publisher = rospy.Publisher("/trajectory", Trajectory, queue_size=1)
+        wait_until("the bridge listens", lambda: publisher.get_num_connections() > 0, 10.0)
+
+        jump = Trajectory(id=1 << 40, position_knot_s=0.1, yaw_knot_s=0.1)
+        jump.header.stamp = rospy.Time.now()
+        jump.position_control_points = [Point(4.5, 4.5, 1.0)] * 4  # metres away, inside the box
+        jump.yaw_control_points = [0.0] * 4
+        publisher.publish(jump)
+
+        self.assertEqual(flight.wait_end(), 1)
+        self.assert_at_rest_with_results(flight, "stage_failed", is_gate_silent=False)
+        self.assert_reported(flight, "/bridge", DiagnosticStatus.ERROR, "the gate refused")
+
     def test_a_wrong_configuration_starts_nothing(self):
         flight = self.fly("--overrides", "camera: {width_pixels: 640}")
 
@@ -318,5 +334,5 @@ def write_bad_bag(path):
 
 
 if __name__ == "__main__":
-    rospy.init_node("robustness_test", disable_signals=True)
+    rospy.init_node("see_robustness", disable_signals=True)
     rostest.rosrun("understory_ros_test", "robustness", Robustness)

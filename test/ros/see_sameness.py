@@ -80,5 +80,5 @@ class Sameness(unittest.TestCase):
 
 
 if __name__ == "__main__":
-    rospy.init_node("sameness_test", disable_signals=True)
+    rospy.init_node("see_sameness", disable_signals=True)
     rostest.rosrun("understory_ros_test", "sameness", Sameness)
