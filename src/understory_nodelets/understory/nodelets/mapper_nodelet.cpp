@@ -19,6 +19,7 @@
 #include "understory/nodelets/depth_to_cloud.hpp"
 #include "understory/nodelets/flight_setup.hpp"
 #include "understory/nodelets/guarded_nodelet.hpp"
+#include "understory/nodelets/lidar_points.hpp"
 #include "understory/nodelets/map_update.hpp"
 
 namespace understory {
@@ -59,8 +60,8 @@ class MapperNodelet : public GuardedNodelet {
     guarded([&] { integrate(*cloud); });
   }
 
-  void on_lidar(const boost::shared_ptr<const Cloud>& cloud) {
-    guarded([&] { integrate_lidar(cloud); });
+  void on_lidar(const sensor_msgs::PointCloud2ConstPtr& message) {
+    guarded([&] { integrate_lidar(*message); });
   }
 
   // The pose of a sensor in the map at a stamp; nothing if tf2 does not know it in time.
@@ -107,25 +108,31 @@ class MapperNodelet : public GuardedNodelet {
     publish(done, stamp, begin_ns);
   }
 
-  void integrate_lidar(const boost::shared_ptr<const Cloud>& cloud) {
+  void integrate_lidar(const sensor_msgs::PointCloud2& message) {
     const std::int64_t begin_ns = steady_ns();
-    const ros::Time stamp = pcl_conversions::fromPCL(cloud->header.stamp);
-    const std::optional<Pose> pose = pose_of(cloud->header.frame_id, stamp);
+    const ros::Time stamp = to_ros(to_time(message.header.stamp));
+    Result<Cloud::Ptr, LidarError> read = lidar_points(message);
+    if (!read) {
+      skip("bad_clouds", to_string(read.error()));
+      return;
+    }
+    const std::optional<Pose> pose = pose_of(message.header.frame_id, stamp);
     if (!pose || !mark_launch_site(stamp)) {
       return;
     }
-    Cloud thinned;
+    Cloud::Ptr points = std::move(read).value();
     if (onboard_.cloud.lidar_leaf_m > 0.0) {
       const auto leaf = static_cast<float>(onboard_.cloud.lidar_leaf_m);
+      auto thinned = std::make_shared<Cloud>();
       pcl::VoxelGrid<pcl::PointXYZ> grid;
-      grid.setInputCloud(pcl::pcl_ptr(cloud));
+      grid.setInputCloud(points);
       grid.setLeafSize(leaf, leaf, leaf);
-      grid.filter(thinned);
+      grid.filter(*thinned);
+      points = std::move(thinned);
     }
-    const Cloud& points = onboard_.cloud.lidar_leaf_m > 0.0 ? thinned : *cloud;
-    const PointsView view{points.empty() ? nullptr : points.points.front().data,
+    const PointsView view{points->empty() ? nullptr : points->points.front().data,
                           sizeof(pcl::PointXYZ) / sizeof(float),
-                          points.size()};
+                          points->size()};
     publish(mapper_->integrate_rays(view, *pose, onboard_.cloud.lidar_range_m, to_time(stamp)),
             stamp,
             begin_ns);
