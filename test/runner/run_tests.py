@@ -14,7 +14,7 @@ import traceback
 
 import builds
 from catkin_check import built_workspace, check_catkin
-from commands import ROOT, cpp_files, say
+from commands import ROOT, cpp_files, output_of, say
 from python_tests import run_python_tests
 from results import SuiteResult, check_minimums, read_minimums, summary, totals
 from ros_tests import run_ros_tests
@@ -68,9 +68,22 @@ def check_page(result, program, page, command):
         result.passed += 1
 
 
+def check_protocol_page(result):
+    page, generator = "docs/can_protocol.md", ROOT / "firmware_bridge/can/generate.py"
+    command = ["/usr/bin/python3", generator, "docs", ROOT / "firmware_bridge/can/understory.dbc"]
+    if (ROOT / page).read_text(encoding="utf-8") == output_of(command):
+        result.passed += 1
+    else:
+        result.failed.append(
+            f"{page} is not current; write it anew with `firmware_bridge/can/generate.py docs"
+            f" firmware_bridge/can/understory.dbc > {page}`"
+        )
+
+
 def check_parameters(folder):
-    say("\n== parameters: docs/parameters.md and docs/onboard_parameters.md are current")
+    say("\n== parameters: the generated pages of docs/ are current")
     result = SuiteResult("parameters")
+    check_protocol_page(result)
     simulate = folder / "src/understory_sim/understory_simulate"
     check_page(result, simulate, "docs/parameters.md", "./understory simulate")
     workspace = built_workspace()

@@ -80,12 +80,14 @@ def entries_of(folders):
     The catkin workspace names files by its links to packages; theirs are the real paths here, so
     that the rules of the folder they lie in hold for them.
     """
+    generated = tuple(f"{os.path.realpath(folder)}/" for folder in folders)
     found = {}
     for folder in folders:
         listed = json.loads((folder / "compile_commands.json").read_text(encoding="utf-8"))
         for entry in listed:
             path = os.path.realpath(entry["file"])
-            if path.startswith(f"{ROOT}/") and path not in found:
+            is_ours = path.startswith(f"{ROOT}/") and not path.startswith(generated)
+            if is_ours and path not in found:
                 command = entry["command"].replace(entry["file"], path)
                 found[path] = {**entry, "file": path, "command": command, "folder": folder}
     return found
