@@ -258,7 +258,7 @@ def write_golden(messages, folder):
     text += ["#pragma once\n", "#include <cstdint>", "#include <string>", "#include <tuple>\n"]
     text += ['#include "understory/can/messages.hpp"\n', "namespace understory::can {\n"]
     text += ["template <class Message>\nstruct GoldenFrame {\n  Message message;"]
-    text += ["  std::uint8_t counter;\n  std::string candump;\n};\n"]
+    text += ["  std::uint8_t counter = 0;\n  std::string candump;\n};\n"]
     text += [golden_text(*example) for example in examples(messages)]
     calls = ", ".join(f"golden_{message.dbc_name.lower()}()" for message in messages)
     text += [f"\ninline auto all_golden_frames() {{\n  return std::make_tuple({calls});\n}}\n"]
