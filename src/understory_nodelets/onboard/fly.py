@@ -86,10 +86,13 @@ def free_port() -> int:
 def start_master(log_path: Path) -> "tuple[subprocess.Popen, str]":
     """An own ROS master, in a session of its own: Ctrl-C is for the flight, not for it."""
     port = free_port()
+    # By address: a machine need not know its own name, or localhost.
+    environment = {"ROS_IP": "127.0.0.1", **os.environ}
     with open(log_path, "w", encoding="utf-8") as log:
         try:
             process = subprocess.Popen(
                 ["rosmaster", "--core", "-p", str(port)],
+                env=environment,
                 stdin=subprocess.DEVNULL,
                 stdout=log,
                 stderr=log,
@@ -97,7 +100,7 @@ def start_master(log_path: Path) -> "tuple[subprocess.Popen, str]":
             )
         except FileNotFoundError as error:
             raise FlyError("rosmaster: not found (./understory setup installs it)") from error
-    uri = f"http://localhost:{port}"
+    uri = f"http://127.0.0.1:{port}"
     until = time.monotonic() + MASTER_PATIENCE_S
     while not is_master(uri):
         if process.poll() is not None or time.monotonic() > until:
