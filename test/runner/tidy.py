@@ -58,8 +58,8 @@ def _key(entry, files, version_and_rules):
 def _look_at(entry, key):
     """Runs clang-tidy over one file; returns what it says, empty if clean."""
     outcome = subprocess.run(
-        ["clang-tidy", "-p", COMMANDS, "--quiet", f"--extra-arg={WARNINGS_OF_GCC_ONLY}"]
-        + [entry["file"]],
+        ["nice", "-n", "19", "clang-tidy", "-p", COMMANDS, "--quiet"]
+        + [f"--extra-arg={WARNINGS_OF_GCC_ONLY}", entry["file"]],
         cwd=ROOT,
         stdin=subprocess.DEVNULL,
         stdout=subprocess.PIPE,
