@@ -231,8 +231,6 @@ def write_cpp(messages, folder):
     header += ["#pragma once\n", "#include <cstdint>", "#include <optional>\n"]
     header += ['#include "understory/can/payload.hpp"\n', "namespace understory::can {\n"]
     header += [struct_text(message) for message in messages]
-    names = ", ".join(message.name for message in messages)
-    header += [f"template <template <class...> class List>\nusing AllMessages = List<{names}>;\n"]
     header += ["}  // namespace understory::can", ""]
     (folder / "messages.hpp").write_text("\n".join(header), encoding="utf-8")
     source = [LICENCE + "// Generated from the DBC; do not edit."]
