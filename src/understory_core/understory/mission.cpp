@@ -105,8 +105,8 @@ void Mission::end_exploration(StopReason reason, Time now) {
 
 // Null where the vehicle rests, or where there is no braking trajectory: then the flown one stands,
 // which ends at rest as well.
-TrajectoryPtr Mission::brake_if(bool is_needed, Time now) {
-  if (!is_needed || !has_map_ || pilot_.is_at_rest(now)) {
+TrajectoryPtr Mission::brake(Time now) {
+  if (!has_map_ || pilot_.is_at_rest(now)) {
     return nullptr;
   }
   const Result<TrajectoryPtr, PlanError> braked = pilot_.brake(now);
@@ -117,7 +117,7 @@ TrajectoryPtr Mission::stop(StopReason reason, Time now) {
   if (is_over()) {
     return nullptr;
   }
-  TrajectoryPtr braking = brake_if(true, now);
+  TrajectoryPtr braking = brake(now);
   if (reason_ == StopReason::kNone) {
     end_exploration(reason, now);
   }
@@ -146,7 +146,7 @@ Mission::Answer Mission::pause(Time now) {
   }
   resumed_state_ = state_;
   state_ = MissionState::kPaused;
-  return {true, brake_if(true, now)};
+  return {true, brake(now)};
 }
 
 Mission::Answer Mission::return_home(Time now) {
@@ -171,7 +171,7 @@ Mission::Answer Mission::land(Time now) {
   }
   failed_legs_ = 0;
   state_ = MissionState::kDescend;
-  return {true, brake_if(true, now)};
+  return {true, brake(now)};
 }
 
 void Mission::withdraw(const TrajectoryPtr& trajectory) {
@@ -305,7 +305,7 @@ MissionStep Mission::on_map(const MapSnapshotPtr& snapshot, Time now) {
     return step;
   }
   if (is_flying_unwatched() && !pilot_.is_at_rest(now) && pilot_.unsafe_from(now)) {
-    step.published = brake_if(true, now);
+    step.published = brake(now);
     return step;
   }
   switch (state_) {

@@ -110,7 +110,7 @@ class Mission {
 
  private:
   [[nodiscard]] bool is_flying_unwatched() const;
-  TrajectoryPtr brake_if(bool is_needed, Time now);
+  TrajectoryPtr brake(Time now);
   void end_exploration(StopReason reason, Time now);
   TrajectoryPtr climb(Time now);
   TrajectoryPtr explore(const ExploreStep& step, Time now);
