@@ -32,14 +32,6 @@ std::int64_t now_ns(clockid_t clock) {
   return time.tv_sec * kNanoseconds + time.tv_nsec;
 }
 
-Setpoint to_setpoint(const TrajectoryPoint& point) {
-  return {point.position_m,
-          point.velocity_mps,
-          point.acceleration_mps2,
-          point.yaw_rad,
-          point.yaw_rate_radps};
-}
-
 Setpoint hold_at(const VehicleState& state) {
   Setpoint hold;
   hold.position_m = state.position_m;
@@ -70,6 +62,14 @@ class Semaphore {
 };
 
 }  // namespace
+
+Setpoint to_setpoint(const TrajectoryPoint& point) {
+  return {point.position_m,
+          point.velocity_mps,
+          point.acceleration_mps2,
+          point.yaw_rad,
+          point.yaw_rate_radps};
+}
 
 Time wall_time() {
   return Time(Duration(now_ns(CLOCK_REALTIME) / 1000));

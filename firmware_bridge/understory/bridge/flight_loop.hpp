@@ -92,6 +92,8 @@ class FlightLoop {
   std::thread thread_;
 };
 
+[[nodiscard]] Setpoint to_setpoint(const TrajectoryPoint& point);
+
 // Wall-clock time as trajectories use it.
 [[nodiscard]] Time wall_time();
 [[nodiscard]] std::int64_t steady_ns();

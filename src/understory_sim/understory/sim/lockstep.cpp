@@ -4,6 +4,8 @@
 
 #include <utility>
 
+#include "understory/bridge/flight_loop.hpp"
+
 namespace understory {
 namespace {
 
@@ -63,12 +65,7 @@ Lockstep::Lockstep(const SimulationConfig& config,
 
 Setpoint Lockstep::setpoint_now() {
   if (now_ >= setpoint_time_ + kSetpointPeriod || now_ == Time{}) {
-    const TrajectoryPoint point = mission_.pilot().follower().sample(now_);
-    setpoint_ = {point.position_m,
-                 point.velocity_mps,
-                 point.acceleration_mps2,
-                 point.yaw_rad,
-                 point.yaw_rate_radps};
+    setpoint_ = to_setpoint(mission_.pilot().follower().sample(now_));
     setpoint_time_ = now_;
   }
   return extrapolated(setpoint_, to_seconds(now_ - setpoint_time_));
