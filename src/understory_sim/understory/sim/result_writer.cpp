@@ -25,7 +25,7 @@ constexpr std::size_t kProbeBytes = 1U << 20U;
 constexpr std::uintmax_t kSpaceBytes = 32U << 20U;  // a long mission writes less
 constexpr int kRowsPerFlush = 64;
 constexpr const char* kMapFile = "map.ot";
-constexpr std::array<const char*, 11> kOwnFiles = {"result.json",
+constexpr std::array<const char*, 15> kOwnFiles = {"result.json",
                                                    "ticks.csv",
                                                    "config.yaml",
                                                    "trunks.csv",
@@ -35,7 +35,11 @@ constexpr std::array<const char*, 11> kOwnFiles = {"result.json",
                                                    "speed.png",
                                                    "modes.png",
                                                    "path.png",
-                                                   "times.png"};
+                                                   "times.png",
+                                                   "trace.csv",
+                                                   "trace.json",
+                                                   "latency.csv",
+                                                   "latency.png"};
 
 [[noreturn]] void fail(const std::string& path, const char* what, int error_number) {
   throw ResultError(path + ": " + what + ": " + std::generic_category().message(error_number));
