@@ -16,7 +16,7 @@ namespace {
 using diagnostic_msgs::DiagnosticStatus;
 
 constexpr double kHealthPeriodS = 1.0;
-constexpr double kReportPeriodS = 5.0;
+constexpr std::int64_t kReportPeriodNs = 5'000'000'000;
 
 diagnostic_msgs::KeyValue key_value(const std::string& key, const std::string& value) {
   diagnostic_msgs::KeyValue pair;
@@ -59,19 +59,29 @@ void GuardedNodelet::guarded(const std::function<void()>& callback) {
     last_failure_ = "unknown exception";
   }
   ++failures_;
-  NODELET_ERROR_THROTTLE(
-      kReportPeriodS, "%s: %s (%lu failures)", getName().c_str(), last_failure_.c_str(), failures_);
+  if (is_log_due()) {
+    NODELET_ERROR("%s: %s (%lu failures)", getName().c_str(), last_failure_.c_str(), failures_);
+  }
   try {
     on_failure();
   } catch (const std::exception& error) {
-    NODELET_ERROR_THROTTLE(kReportPeriodS, "%s: %s", getName().c_str(), error.what());
+    last_failure_ = error.what();
   }
 }
 
 void GuardedNodelet::skip(const std::string& counter, const std::string& why) {
   count(counter);
   last_skip_ = why;
-  NODELET_WARN_THROTTLE(kReportPeriodS, "%s: skipped: %s", getName().c_str(), why.c_str());
+  if (is_log_due()) {
+    NODELET_WARN("%s: skipped: %s", getName().c_str(), why.c_str());
+  }
+}
+
+bool GuardedNodelet::is_log_due() {
+  const std::int64_t now_ns = steady_ns();
+  const bool is_due = last_log_ns_ == 0 || now_ns - last_log_ns_ >= kReportPeriodNs;
+  last_log_ns_ = is_due ? now_ns : last_log_ns_;
+  return is_due;
 }
 
 GuardedNodelet::Health GuardedNodelet::health() {

@@ -54,6 +54,8 @@ class GuardedNodelet : public nodelet::Nodelet {
  private:
   void onInit() final;
   void publish_health();
+  // roscpp's throttled macros count per line of code, so that all nodelets would share one.
+  [[nodiscard]] bool is_log_due();
 
   ros::Publisher diagnostics_publisher_;
   ros::Publisher trace_publisher_;
@@ -64,6 +66,7 @@ class GuardedNodelet : public nodelet::Nodelet {
   std::atomic<std::int64_t> tracing_ns_{0};  // what the marks themselves cost
   int fail_after_calls_ = 0;  // fault injection for tests: parameter ~fail_after_calls
   std::string last_failure_;
+  std::int64_t last_log_ns_ = 0;
   std::string last_skip_;  // since the last diagnostics
 };
 
