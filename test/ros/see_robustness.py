@@ -46,6 +46,7 @@ class Flight:
 
     def __init__(self, *options, uri=None):
         self.folder = Path(tempfile.mkdtemp(prefix="understory_robustness_"))
+        self.output = tempfile.TemporaryFile("w+", encoding="utf-8")
         self.status = None
         self.statuses = 0
         self.diagnostics = {}  # name: worst (level, message) so far
@@ -63,6 +64,7 @@ class Flight:
             ["rosrun", "understory_nodelets", "onboard", "--scenario", "clearing"]
             + ["--result-folder", str(self.folder), *options],
             env=environment,
+            stdout=self.output,
             start_new_session=True,
         )
 
@@ -94,6 +96,10 @@ class Flight:
 
     def result(self):
         return json.loads((self.folder / "result.json").read_text(encoding="utf-8"))
+
+    def said(self):
+        self.output.seek(0)
+        return self.output.read()
 
     def last_tick(self):
         with open(self.folder / "ticks.csv", encoding="utf-8") as file:
@@ -207,6 +213,28 @@ class Robustness(unittest.TestCase):
         self.assertTrue(skipped)
         self.assertIsNone(flight.status, "a mission began without a single known pose")
         self.assertEqual(flight.values["/mapper"].get("updates", 0), 0)
+
+        flight.process.send_signal(signal.SIGINT)
+        self.assertEqual(flight.wait_end(10.0), 1, "nothing flies that must come to rest first")
+
+    def test_a_result_folder_that_vanishes_is_said_and_ends_the_flight(self):
+        flight = self.fly()
+        flight.wait_airborne()
+        shutil.rmtree(flight.folder)
+
+        flight.process.send_signal(signal.SIGINT)
+
+        self.assertEqual(flight.wait_end(), 1)
+        self.assertIn("results are lost", flight.said())
+
+    def test_without_a_recorder_the_mission_itself_ends_the_flight(self):
+        flight = self.fly("--without", "recorder")
+        flight.wait_airborne()
+
+        flight.process.send_signal(signal.SIGINT)
+
+        self.assertEqual(flight.wait_end(15.0), 1)
+        self.assertEqual(flight.status.stop_reason, MissionStatus.INTERRUPTED)
 
     def test_a_bag_of_bad_images_is_counted_and_survived(self):
         flight = self.fly("--without", "sim_camera", "--overrides", "mission: {auto_start: false}")

@@ -16,6 +16,7 @@
 #include <ros/ros.h>
 #include <understory_msgs/MissionCommand.h>
 #include <understory_msgs/MissionResult.h>
+#include <understory_msgs/MissionStatus.h>
 
 #include "understory/nodelets/onboard_config.hpp"
 
@@ -127,29 +128,30 @@ bool load_all(nodelet::Loader& loader, const std::vector<std::string>& without) 
   return true;
 }
 
-// Until the result has come, or what was to stop did not stop in time.
+// Until the result has come, or what was to stop did not stop in time. Where nobody records, the
+// mission's own word is the result.
 class MissionWatch {
  public:
-  explicit MissionWatch(ros::NodeHandle& nh)
-      : command_(nh.advertise<understory_msgs::MissionCommand>("command", 10)),
-        result_(nh.subscribe("result", 1, &MissionWatch::on_result, this)) {}
+  MissionWatch(ros::NodeHandle& nh, bool is_recorded)
+      : is_recorded_(is_recorded),
+        command_(nh.advertise<understory_msgs::MissionCommand>("command", 10)),
+        result_(nh.subscribe("result", 1, &MissionWatch::on_result, this)),
+        status_(nh.subscribe("status", 1, &MissionWatch::on_status, this)) {}
 
   int wait() {
     int handled = 0;
     ros::WallTime stop_at;
-    while (!has_result_) {
+    while (!has_ended_) {
       ros::getGlobalCallbackQueue()->callAvailable(ros::WallDuration(0.1));
       if (g_interrupts > handled) {
         handled = g_interrupts;
-        if (handled > 1) {
-          fmt::print(stderr, "onboard: interrupted again: ends at once\n");
+        if (handled > 1 || !has_mission_) {
+          fmt::print(
+              stderr, "\nonboard: interrupted{}\n", handled > 1 ? " again" : " before it flew");
           return 1;
         }
-        fmt::print(stderr, "\nonboard: stopping; the vehicle comes to rest first\n");
+        stop();
         stop_at = ros::WallTime::now();
-        auto stop = boost::make_shared<understory_msgs::MissionCommand>();
-        stop->command = understory_msgs::MissionCommand::STOP;
-        command_.publish(understory_msgs::MissionCommandConstPtr(stop));
       }
       if (handled > 0 && (ros::WallTime::now() - stop_at).toSec() > kStopPatienceS) {
         fmt::print(stderr, "onboard: no result {} s after the stop\n", kStopPatienceS);
@@ -160,16 +162,36 @@ class MissionWatch {
   }
 
  private:
-  void on_result(const understory_msgs::MissionResultConstPtr& result) {
-    has_result_ = true;
-    is_good_ = result->good != 0;
-    fmt::print("{}\n", result->summary);
-    std::fflush(stdout);
+  void stop() {
+    fmt::print(stderr, "\nonboard: stopping; the vehicle comes to rest first\n");
+    auto stop = boost::make_shared<understory_msgs::MissionCommand>();
+    stop->command = understory_msgs::MissionCommand::STOP;
+    command_.publish(understory_msgs::MissionCommandConstPtr(stop));
   }
 
+  void on_result(const understory_msgs::MissionResultConstPtr& result) {
+    has_ended_ = true;
+    is_good_ = result->good != 0;
+    fmt::print("{}\n", result->summary);
+    static_cast<void>(std::fflush(stdout));
+  }
+
+  void on_status(const understory_msgs::MissionStatusConstPtr& status) {
+    using Status = understory_msgs::MissionStatus;
+    has_mission_ = true;
+    const bool is_over = status->state == Status::LAND || status->state == Status::STOPPED;
+    if (!is_recorded_ && is_over && status->at_rest != 0) {
+      has_ended_ = true;
+      is_good_ = status->stop_reason == Status::NOTHING_LEFT;
+    }
+  }
+
+  bool is_recorded_;
   ros::Publisher command_;
   ros::Subscriber result_;
-  bool has_result_ = false;
+  ros::Subscriber status_;
+  bool has_mission_ = false;
+  bool has_ended_ = false;
   bool is_good_ = false;
 };
 
@@ -213,7 +235,8 @@ class OwnParameters {
 int run(const Options& options) {
   ros::NodeHandle nh;
   const OwnParameters parameters(options, nh);
-  MissionWatch watch(nh);
+  const std::vector<std::string>& without = options.without;
+  MissionWatch watch(nh, std::find(without.begin(), without.end(), "recorder") == without.end());
   nodelet::Loader loader(ros::NodeHandle("~"));
   const int status = load_all(loader, options.without) ? watch.wait() : 2;
   loader.clear();

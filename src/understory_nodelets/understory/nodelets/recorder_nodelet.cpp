@@ -156,6 +156,20 @@ class RecorderNodelet : public GuardedNodelet {
     }
   }
 
+  // What could not be written; who waits for the result must not wait for ever.
+  std::string write(const MissionResult& result) {
+    try {
+      if (!folder_.empty()) {
+        ticks_->close();
+        traces_->flush();
+        record_->write(folder_, *map_, result);
+      }
+      return {};
+    } catch (const std::exception& error) {
+      return std::string("; results are lost: ") + error.what();
+    }
+  }
+
   void finish() {
     if (is_finished_ || !status_) {
       return;
@@ -169,17 +183,13 @@ class RecorderNodelet : public GuardedNodelet {
     result.counters["gate_violations"] = flight_.gate_violations;
     result.counters["skipped_deadlines"] = flight_.skipped_deadlines;
     live_->finish(row_, 1.0);
-    if (!folder_.empty()) {
-      ticks_->close();
-      traces_->flush();
-      record_->write(folder_, *map_, result);
-    }
+    const std::string lost = write(result);
     auto msg = boost::make_shared<understory_msgs::MissionResult>();
     msg->header.stamp = ros::Time::now();
-    msg->good = static_cast<std::uint8_t>(result.is_good());
+    msg->good = static_cast<std::uint8_t>(result.is_good() && lost.empty());
     msg->stop_reason = result.stop_reason;
     msg->folder = folder_;
-    msg->summary = summary_of(result);
+    msg->summary = summary_of(result) + lost;
     NODELET_INFO("%s", msg->summary.c_str());
     result_publisher_.publish(understory_msgs::MissionResultConstPtr(msg));
   }
