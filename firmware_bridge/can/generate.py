@@ -12,6 +12,7 @@ import contextlib
 import io
 import re
 import sys
+import zlib
 from pathlib import Path
 
 quiet = io.StringIO()  # it talks about formats it does not know
@@ -51,10 +52,13 @@ class Signal:
         self.factor, self.offset = float(signal.factor), float(signal.offset)
         self.low, self.high = float(signal.min), float(signal.max)
         self.unit = signal.unit
-        self.values = signal.values
+        self.values = {int(value): name for value, name in signal.values.items()}
+        self.comment = signal.comment or ""
         words = re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", signal.name).lower()
         suffix = UNITS[signal.unit] if signal.unit else ""
         self.name = f"{words}_{suffix}" if suffix else words
+        # Codes have an enumeration of the signal's name; EscErr0 to EscErr3 share one.
+        self.enum = re.sub(r"\d$", "", signal.name) if signal.values else ""
         # Counts, codes and wrapping clocks are whole numbers; everything else is measured.
         self.is_whole = self.factor == 1.0 and self.offset == 0.0 and self.unit in ("", "us", "s")
 
@@ -75,7 +79,7 @@ class Signal:
 class Message:
     def __init__(self, frame, position):
         self.dbc_name = frame.name
-        self.name = "".join(word.capitalize() for word in frame.name.split("_"))
+        self.name = camel(frame.name)
         self.id = frame.arbitration_id.id
         self.data_id = FIRST_DATA_ID + DATA_ID_STEP * position
         self.sender = frame.transmitters[0]
@@ -117,7 +121,14 @@ def read_messages(path):
         raise LayoutError(f"{path}: no messages, or signals named twice: {' '.join(twice)}")
     if max(message.data_id for message in messages) > 0xFF:
         raise LayoutError(f"{path}: more messages than data identifiers")
-    return messages
+    return version_of(path), messages
+
+
+def version_of(path):
+    match = re.search(r'^VERSION "(\d+\.\d+[^"]*)"', path.read_text(encoding="utf-8"), re.M)
+    if not match:
+        raise LayoutError(f"{path}: no VERSION such as 1.0.0")
+    return match[1]
 
 
 # --- frames, independently of the C++ code -------------------------------------------------------
@@ -168,11 +179,81 @@ def examples(messages):
 # --- C++ -----------------------------------------------------------------------------------------
 
 
+def camel(name):
+    return "".join(word.capitalize() for word in name.split("_"))
+
+
+def whole_type(signal):
+    if signal.enum:
+        return signal.enum
+    return "bool" if signal.size == 1 else "std::uint32_t"
+
+
 def field_line(signal):
     if signal.is_whole:
-        kind = "std::int32_t" if signal.is_signed else "std::uint32_t"
-        return f"  {kind} {signal.name} = 0;"
+        return f"  {whole_type(signal)} {signal.name}{{}};"
     return f"  double {signal.name} = kNotAvailable;"
+
+
+def enums(messages):
+    """{name: {code: name}} of all signals with named codes."""
+    found = {}
+    for message in messages:
+        for signal in message.signals:
+            if signal.enum and found.setdefault(signal.enum, signal.values) != signal.values:
+                raise LayoutError(f"signal {signal.dbc_name}: codes differ from its namesakes'")
+    return found
+
+
+def enum_text(name, values):
+    lines = [f"enum class {name} : std::uint32_t {{"]
+    lines += [f"  k{camel(word)} = {value}," for value, word in sorted(values.items())]
+    return "\n".join(lines + ["};", f"[[nodiscard]] const char* to_string({name} value);", ""])
+
+
+def enum_names_text(name, values):
+    lines = [f"const char* to_string({name} value) {{", "  switch (value) {"]
+    for value, word in sorted(values.items()):
+        lines += [f"    case {name}::k{camel(word)}:", f'      return "{word}";']
+    return "\n".join(lines + ["  }", '  return "unknown code";', "}\n"])
+
+
+def protocol_hash(messages):
+    """Of all that two stations must agree on."""
+    agreed = [
+        (message.id, message.data_id)
+        + tuple(
+            (signal.dbc_name, signal.start, signal.size, signal.factor, signal.offset)
+            + tuple(sorted(signal.values.items()))
+            for signal in message.signals
+        )
+        for message in messages
+    ]
+    return zlib.crc32(repr(agreed).encode()) & 0xFFFF
+
+
+def constants_text(version, messages):
+    major, minor = version.split(".")[:2]
+    rows = ",\n    ".join(
+        f'{{"{message.dbc_name}", 0x{message.id:03X}, {message.period_ms}, '
+        f'{"true" if message.sender == "HOST" else "false"}}}'
+        for message in messages
+    )
+    return "\n".join(
+        [
+            f"inline constexpr std::uint32_t kProtocolMajor = {major};",
+            f"inline constexpr std::uint32_t kProtocolMinor = {minor};",
+            "// Of the messages, their signals and codes: what two stations must agree on.",
+            f"inline constexpr std::uint32_t kDbcHash = 0x{protocol_hash(messages):04X};\n",
+            "struct MessageInfo {",
+            "  const char* name;",
+            "  std::uint16_t id;",
+            "  std::uint16_t period_ms;  // at the highest rate; 0: on event",
+            "  bool is_from_host;",
+            "};",
+            f"inline constexpr std::array<MessageInfo, {len(messages)}> kMessages{{{{\n    {rows},\n}}}};\n",
+        ]
+    )
 
 
 def layout(signal):
@@ -203,8 +284,13 @@ def codec_text(message):
     puts, gets = [], []
     for signal in message.signals:
         if signal.is_whole:
-            puts.append(f"  writer.put_whole({signal.start}, {signal.size}, message.{signal.name});")
-            gets.append(f"  message.{signal.name} = get_whole(payload, {signal.start}, {signal.size});")
+            place, kind = f"{signal.start}, {signal.size}", whole_type(signal)
+            value = f"message.{signal.name}"
+            is_plain = kind == "std::uint32_t"
+            code = value if is_plain else f"static_cast<std::uint32_t>({value})"
+            puts.append(f"  writer.put_whole({place}, {code});")
+            got = f"get_whole(payload, {place})"
+            gets.append(f"  {value} = {got if is_plain else f'static_cast<{kind}>({got})'};")
         else:
             constant = f"k{message.name}{signal.dbc_name}"
             puts.append(f"  writer.put({constant}, message.{signal.name});")
@@ -223,18 +309,21 @@ def codec_text(message):
     )
 
 
-def write_cpp(messages, folder):
+def write_cpp(version, messages, folder):
     folder.mkdir(parents=True, exist_ok=True)
     header = [LICENCE + "//\n// Generated from the DBC; do not edit. Every message of the bus, in SI"]
     header += ["// units. A value that is not available is NaN. to_payload: nothing for a value that is"]
     header += ["// infinite or out of range. from_payload: false for a code that the protocol forbids."]
-    header += ["#pragma once\n", "#include <cstdint>", "#include <optional>\n"]
+    header += ["#pragma once\n", "#include <array>", "#include <cstdint>", "#include <optional>\n"]
     header += ['#include "understory/can/payload.hpp"\n', "namespace understory::can {\n"]
+    header += [constants_text(version, messages)]
+    header += [enum_text(name, values) for name, values in enums(messages).items()]
     header += [struct_text(message) for message in messages]
     header += ["}  // namespace understory::can", ""]
     (folder / "messages.hpp").write_text("\n".join(header), encoding="utf-8")
     source = [LICENCE + "// Generated from the DBC; do not edit."]
     source += ['#include "understory/can/messages.hpp"\n', "namespace understory::can {\n"]
+    source += [enum_names_text(name, values) for name, values in enums(messages).items()]
     source += [codec_text(message) for message in messages]
     source += ["}  // namespace understory::can", ""]
     (folder / "messages.cpp").write_text("\n".join(source), encoding="utf-8")
@@ -244,8 +333,10 @@ def golden_text(message, counter, raws, data):
     lines = [f"inline GoldenFrame<{message.name}> golden_{message.dbc_name.lower()}() {{"]
     lines += [f"  {message.name} message;"]
     for signal, raw in zip(message.signals, raws):
-        suffix = "U" if signal.is_whole and not signal.is_signed else ""
-        lines.append(f"  message.{signal.name} = {physical(signal, raw)}{suffix};")
+        value = f"{physical(signal, raw)}U" if signal.is_whole else physical(signal, raw)
+        if signal.is_whole and whole_type(signal) != "std::uint32_t":
+            value = f"static_cast<{whole_type(signal)}>({value})"
+        lines.append(f"  message.{signal.name} = {value};")
     lines += [f'  return {{message, {counter}, "{message.id:03X}#{data.hex().upper()}"}};', "}"]
     return "\n".join(lines)
 
@@ -299,9 +390,12 @@ def docs_text(messages):
             f"`0x{message.id:03X}`, from {message.sender}, {period}, data identifier "
             f"0x{message.data_id:02X}.\n"
         ]
+        text += [message.comment + "\n"] if message.comment else []
         text += ["| signal | bit | type | scale | unit | range | not available | codes | example |"]
         text += ["|---|---|---|---|---|---|---|---|---|"]
         text += [signal_row(signal, raw) for signal, raw in zip(message.signals, raws)]
+        notes = [f"- `{s.dbc_name}`: {s.comment}" for s in message.signals if s.comment]
+        text += ["", *notes] if notes else []
         text += [f"\nExample, counter {counter}: `{message.id:03X}#{data.hex().upper()}`\n"]
     return "\n".join(text).rstrip()
 
@@ -311,11 +405,11 @@ def main(words):
         print(__doc__, file=sys.stderr)
         return 2
     try:
-        messages = read_messages(Path(words[1]))
+        version, messages = read_messages(Path(words[1]))
         if words[0] == "docs":
             print(docs_text(messages))
         elif words[0] == "cpp":
-            write_cpp(messages, Path(words[2]))
+            write_cpp(version, messages, Path(words[2]))
         else:
             write_golden(messages, Path(words[2]))
     except (LayoutError, KeyError, IndexError, OSError) as error:
