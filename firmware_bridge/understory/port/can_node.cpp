@@ -1,0 +1,71 @@
+// Copyright 2026 the Understory authors
+// SPDX-License-Identifier: BSD-3-Clause
+#include "understory/port/can_node.hpp"
+
+#include <algorithm>
+#include <cassert>
+#include <utility>
+
+namespace understory::can {
+
+CanNode::CanNode(std::unique_ptr<CanPort> port, const CanNodeConfig& config)
+    : port_(std::move(port)), queue_(config.transmits, config.set), guard_(config.receives) {
+  assert(port_ != nullptr);
+}
+
+void CanNode::run_until(Time until, FrameHandler& handler) {
+  for (Time now = poll(handler); now < until; now = poll(handler)) {
+    const std::optional<Time> wake = queue_.wake_at();
+    port_->wait(wake ? std::min(until, *wake) : until);
+  }
+}
+
+Time CanNode::poll(FrameHandler& handler) {
+  now_ = port_->now();
+  // Bounded, because a flood may come faster than it is handled.
+  for (int batches = 0; batches < kMostBatches; ++batches) {
+    const std::size_t count = port_->receive(batch_.data(), batch_.size());
+    for (std::size_t i = 0; i < count; ++i) {
+      handle(batch_[i], handler);
+    }
+    queue_.pump(*port_, now_);
+    if (count < batch_.size()) {
+      break;
+    }
+  }
+  return now_;
+}
+
+void CanNode::handle(const PortFrame& frame, FrameHandler& handler) {
+  if (tap_) {
+    tap_->on_port_frame(frame);
+  }
+  if (frame.is_own) {
+    queue_.confirm(frame.frame, now_);
+    handler.on_echo(frame);
+    return;
+  }
+  if (queue_.allowed()[frame.frame.id % kIdCount]) {
+    ++counters_.foreign_own_ids;
+    return;
+  }
+  switch (guard_.accept(frame.frame.id, frame.stamp)) {
+    case FloodGuard::Answer::kPass:
+      ++counters_.received;
+      handler.on_frame(frame);
+      return;
+    case FloodGuard::Answer::kFlood:
+      ++counters_.flooded;
+      last_flood_ = now_;
+      return;
+    case FloodGuard::Answer::kUnlisted:
+      ++counters_.unlisted;
+      return;
+  }
+}
+
+bool CanNode::is_flooded() const {
+  return last_flood_ && now_ >= *last_flood_ && now_ - *last_flood_ < kFloodHold;
+}
+
+}  // namespace understory::can
