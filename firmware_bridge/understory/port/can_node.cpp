@@ -22,16 +22,17 @@ void CanNode::run_until(Time until, FrameHandler& handler) {
 
 Time CanNode::poll(FrameHandler& handler) {
   now_ = port_->now();
-  // Bounded, because a flood may come faster than it is handled.
-  for (int batches = 0; batches < kMostBatches; ++batches) {
+  // Again after sending, because on a vcan the echo is there at once. Bounded, because a flood may
+  // come faster than it is handled.
+  bool goes_on = true;
+  for (int batches = 0; goes_on && batches < kMostBatches; ++batches) {
     const std::size_t count = port_->receive(batch_.data(), batch_.size());
     for (std::size_t i = 0; i < count; ++i) {
       handle(batch_[i], handler);
     }
+    const std::uint64_t sent = queue_.counters().sent;
     queue_.pump(*port_, now_);
-    if (count < batch_.size()) {
-      break;
-    }
+    goes_on = count == batch_.size() || queue_.counters().sent != sent;
   }
   return now_;
 }
