@@ -23,6 +23,15 @@ struct LinkCounters {
   std::uint64_t repeated = 0;
   std::uint64_t wrong_sequence = 0;
   std::uint64_t errors = 0;  // checksum, length, forbidden code
+
+  LinkCounters& operator+=(const LinkCounters& other) {
+    good += other.good;
+    lost += other.lost;
+    repeated += other.repeated;
+    wrong_sequence += other.wrong_sequence;
+    errors += other.errors;
+    return *this;
+  }
 };
 
 class CounterCheck {

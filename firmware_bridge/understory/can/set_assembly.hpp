@@ -46,6 +46,8 @@ class SetAssembly {
     return true;
   }
 
+  // Whether frames of this counter belong to the set being gathered, or to the one just complete.
+  [[nodiscard]] bool is_current(std::uint8_t counter) const { return counter_ == counter; }
   [[nodiscard]] std::uint64_t complete() const { return complete_; }
   [[nodiscard]] std::uint64_t torn() const { return torn_; }
 
