@@ -94,16 +94,23 @@ class FakeAutopilot : public Autopilot {
   explicit FakeAutopilot(std::shared_ptr<AutopilotLog> log) : log_(std::move(log)) {}
   ~FakeAutopilot() override { log_->add_destruction(); }
 
-  void send(const Setpoint& setpoint, Time now) override {
-    std::this_thread::sleep_for(log_->add({setpoint, now}));
+  void send(const std::optional<Setpoint>& setpoint, bool /*is_hold*/, Time now) override {
+    if (setpoint) {
+      std::this_thread::sleep_for(log_->add({*setpoint, now}));
+    }
   }
   [[nodiscard]] Telemetry receive(Time now) override {
     Telemetry telemetry;
     telemetry.time = now;
     telemetry.state = log_->vehicle();
+    telemetry.is_valid = true;
+    telemetry.is_following = true;
     return telemetry;
   }
-  void land() override { log_->add_landing(); }
+  void run_until(std::int64_t steady_ns) override { sleep_until(steady_ns); }
+  void arm() override {}
+  void disarm() override { log_->add_landing(); }
+  void kill() override {}
 
  private:
   std::shared_ptr<AutopilotLog> log_;

@@ -197,15 +197,15 @@ TEST(FlightLoop, SetpointsThatFailTheGateAreHeldAndCounted) {
   }
 }
 
-TEST(FlightLoop, LandReachesTheAutopilotExactlyOnce) {
+TEST(FlightLoop, EveryWishToDisarmReachesTheAutopilotOnce) {
   FlightBench bench(test::flight_config(kRateHz));
   ASSERT_EQ(bench.ticks(5).size(), 5U);
   EXPECT_EQ(bench.log->landings(), 0);
 
-  bench.loop->land();
-  bench.loop->land();
+  bench.loop->disarm();
+  bench.loop->disarm();
   ASSERT_EQ(bench.ticks(10).size(), 10U);
-  bench.loop->land();
+  bench.loop->disarm();
   ASSERT_EQ(bench.ticks(5).size(), 5U);
 
   EXPECT_EQ(bench.log->landings(), 1);
@@ -252,7 +252,7 @@ TEST(FlightLoop, EndsAtAnyMomentAndSendsNothingAfterwards) {
       std::this_thread::sleep_for(std::chrono::microseconds(rng.below(2000)));
     }
     if (rng.below(3) == 0) {
-      bench.loop->land();
+      bench.loop->disarm();
     }
     std::this_thread::sleep_for(std::chrono::microseconds(rng.below(2000)));
 

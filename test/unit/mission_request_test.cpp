@@ -288,7 +288,7 @@ TEST(MissionRequest, EveryStateAndReasonHasANameOfItsOwn) {
     EXPECT_TRUE(names.insert(to_string(static_cast<MissionState>(i))).second) << i;
   }
   names = {"?"};
-  for (int i = 0; i <= static_cast<int>(StopReason::kStageFailed); ++i) {
+  for (int i = 0; i <= static_cast<int>(StopReason::kTrackingLost); ++i) {
     EXPECT_TRUE(names.insert(to_string(static_cast<StopReason>(i))).second) << i;
   }
 }

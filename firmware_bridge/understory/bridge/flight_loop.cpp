@@ -26,19 +26,6 @@ timespec to_timespec(std::int64_t nanoseconds) {
           static_cast<long>(nanoseconds % kNanoseconds)};
 }
 
-std::int64_t now_ns(clockid_t clock) {
-  timespec time{};
-  clock_gettime(clock, &time);
-  return time.tv_sec * kNanoseconds + time.tv_nsec;
-}
-
-Setpoint hold_at(const VehicleState& state) {
-  Setpoint hold;
-  hold.position_m = state.position_m;
-  hold.yaw_rad = yaw_of(state.world_from_body);
-  return hold;
-}
-
 class Semaphore {
  public:
   Semaphore() { sem_init(&semaphore_, 0, 0); }
@@ -48,8 +35,7 @@ class Semaphore {
 
   void post() { sem_post(&semaphore_); }
   bool wait(std::chrono::milliseconds at_most) {
-    const timespec until =
-        to_timespec(now_ns(CLOCK_MONOTONIC) + std::chrono::nanoseconds(at_most).count());
+    const timespec until = to_timespec(steady_ns() + std::chrono::nanoseconds(at_most).count());
     int status = 0;
     do {
       status = sem_clockwait(&semaphore_, CLOCK_MONOTONIC, &until);
@@ -62,22 +48,6 @@ class Semaphore {
 };
 
 }  // namespace
-
-Setpoint to_setpoint(const TrajectoryPoint& point) {
-  return {point.position_m,
-          point.velocity_mps,
-          point.acceleration_mps2,
-          point.yaw_rad,
-          point.yaw_rate_radps};
-}
-
-Time wall_time() {
-  return Time(Duration(now_ns(CLOCK_REALTIME) / 1000));
-}
-
-std::int64_t steady_ns() {
-  return now_ns(CLOCK_MONOTONIC);
-}
 
 // One writer and one reader each. Plans belong to the thread that offers them, because freeing
 // memory is not for the flight thread: it gets pointers and tells how many it has taken; of those
@@ -98,15 +68,13 @@ struct FlightLoop::Mailboxes {
   const TrajectoryFollower* plan = nullptr;
   std::uint64_t plan_count = 0;
   std::uint64_t sent_id = 0;
-  std::optional<Setpoint> hold;
-  bool has_landed_autopilot = false;
 };
 
 FlightLoop::FlightLoop(const FlightConfig& config,
                        const Box3d& box_m,
                        std::unique_ptr<Autopilot> autopilot)
     : config_(config),
-      gate_(config.gate, box_m),
+      control_(config.gate, config.tracking, box_m),
       autopilot_(std::move(autopilot)),
       mailboxes_(std::make_unique<Mailboxes>()) {
   thread_ = std::thread([this] { run(); });
@@ -131,8 +99,36 @@ void FlightLoop::offer(const TrajectoryPtr& trajectory, Time now) {
   }
 }
 
-void FlightLoop::land() {
-  is_landing_ = true;
+void FlightLoop::arm() {
+  // Whoever wants the motors to stop comes first.
+  Wish expected = Wish::kNone;
+  wish_.compare_exchange_strong(expected, Wish::kArm);
+}
+
+void FlightLoop::disarm() {
+  Wish earlier = wish_;
+  while (earlier != Wish::kKill && !wish_.compare_exchange_weak(earlier, Wish::kDisarm)) {
+  }
+}
+
+void FlightLoop::kill() {
+  wish_ = Wish::kKill;
+}
+
+void FlightLoop::pass_wish_on() {
+  switch (wish_.exchange(Wish::kNone)) {
+    case Wish::kArm:
+      autopilot_->arm();
+      break;
+    case Wish::kDisarm:
+      autopilot_->disarm();
+      break;
+    case Wish::kKill:
+      autopilot_->kill();
+      break;
+    case Wish::kNone:
+      break;
+  }
 }
 
 void FlightLoop::settle(std::chrono::milliseconds at_most) const {
@@ -165,31 +161,26 @@ void FlightLoop::turn(FlightTick& tick) {
     ++boxes.plan_count;
   }
   boxes.taken = boxes.plan_count;
+  pass_wish_on();
   const Time now = wall_time();
-  if (boxes.plan) {
-    const Trajectory& flown = boxes.plan->at(now);
-    tick.setpoint = gate_.pass(to_setpoint(flown.sample(now)), now);
-    tick.trajectory_id = flown.id;
-    tick.depth_stamp = flown.depth_stamp;
-    tick.is_at_rest = now >= boxes.plan->newest()->end();
-    tick.is_first_of_trajectory = flown.id != boxes.sent_id;
-    boxes.sent_id = flown.id;
-  } else {
-    const Setpoint hold = boxes.hold ? *boxes.hold : hold_at(autopilot_->receive(now).state);
-    tick.setpoint = gate_.pass(hold, now);
-    boxes.hold = tick.setpoint;
+  const FlightDecision decision = control_.decide(boxes.plan, autopilot_->receive(now), now);
+  tick.setpoint = decision.setpoint;
+  tick.is_at_rest = decision.is_at_rest;
+  tick.is_astray = control_.is_astray();
+  if (decision.flown != nullptr) {
+    tick.trajectory_id = decision.flown->id;
+    tick.depth_stamp = decision.flown->depth_stamp;
+    tick.is_first_of_trajectory = decision.flown->id != boxes.sent_id;
+    boxes.sent_id = decision.flown->id;
   }
-  if (is_landing_ && !boxes.has_landed_autopilot) {
-    autopilot_->land();
-    boxes.has_landed_autopilot = true;
-  }
-  if (tick.setpoint) {
-    autopilot_->send(*tick.setpoint, now);
-  }
+  autopilot_->send(decision.setpoint, decision.is_hold, now);
   tick.sent_ns = steady_ns();
+  tick.sent_wall = wall_time();
   tick.telemetry = autopilot_->receive(now);
-  tick.gate_violations = gate_.violations();
-  boxes.at_rest_after = tick.is_at_rest ? boxes.plan_count : kFlying;
+  tick.gate_violations = control_.gate_violations();
+  // What will never be flown need not be waited for.
+  const bool is_flying = decision.flown != nullptr && !tick.is_at_rest;
+  boxes.at_rest_after = is_flying ? kFlying : boxes.plan_count;
 }
 
 void FlightLoop::run() {
@@ -199,9 +190,7 @@ void FlightLoop::run() {
   std::int64_t due_ns = steady_ns() + period_ns;
   std::uint64_t skipped = 0;
   while (!is_stopping_) {
-    const timespec until = to_timespec(due_ns);
-    while (clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &until, nullptr) == EINTR) {
-    }
+    autopilot_->run_until(due_ns);
     FlightTick tick;
     tick.due_ns = due_ns;
     tick.woken_ns = steady_ns();

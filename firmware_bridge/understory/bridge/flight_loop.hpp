@@ -7,7 +7,8 @@
 // exception. Trajectory times are wall-clock time (microseconds since 1970). Before the first
 // trajectory it sends a hold where the vehicle is; every trajectory ends at rest, so with nobody
 // left to plan the vehicle ends at rest. Construction throws on wrong configuration; any one thread
-// may call offer(), land() and settle(), any other one wait_for_tick().
+// may call offer() and settle(), any thread arm(), disarm() and kill(), any other one
+// wait_for_tick().
 #pragma once
 
 #include <atomic>
@@ -17,9 +18,8 @@
 #include <optional>
 #include <thread>
 
-#include "understory/bridge/autopilot.hpp"
-#include "understory/bridge/setpoint_gate.hpp"
-#include "understory/plan/trajectory_follower.hpp"
+#include "understory/bridge/clocks.hpp"
+#include "understory/bridge/flight_control.hpp"
 
 namespace understory {
 
@@ -27,6 +27,7 @@ struct FlightConfig {
   double rate_hz = 100.0;
   int priority = 70;
   GateConfig gate;
+  TrackingConfig tracking;
 
   void visit(FieldVisitor& f) {
     f.field("rate_hz", rate_hz, in_range(20.0, 400.0), "of setpoints");
@@ -35,6 +36,7 @@ struct FlightConfig {
             in_range(0, 98),
             "of the flight thread under SCHED_FIFO, where allowed; 0: an ordinary thread");
     f.section("gate", gate, "The last check of every setpoint.");
+    f.section("tracking", tracking, "Whether the vehicle is where it should be.");
   }
 };
 
@@ -43,12 +45,14 @@ struct FlightTick {
   std::int64_t due_ns = 0;
   std::int64_t woken_ns = 0;
   std::int64_t sent_ns = 0;
-  std::optional<Setpoint> setpoint;  // nothing was sent: the gate has let none through yet
+  Time sent_wall{};                  // the same by the wall clock
+  std::optional<Setpoint> setpoint;  // nothing: it is not known where the vehicle is
   Telemetry telemetry;
   std::uint64_t trajectory_id = 0;  // 0: none yet
   Time depth_stamp{};               // of that trajectory
   bool is_at_rest = true;           // that trajectory has ended
   bool is_first_of_trajectory = false;
+  bool is_astray = false;  // not where the trajectory is: it holds from then on
   std::uint64_t gate_violations = 0;
   std::uint64_t skipped_deadlines = 0;
 };
@@ -62,7 +66,10 @@ class FlightLoop {
 
   // Takes over at its own start time.
   void offer(const TrajectoryPtr& trajectory, Time now);
-  void land();
+  // What of it comes true, telemetry tells.
+  void arm();
+  void disarm();
+  void kill();
   // Waits until what is flown has ended at rest, but not longer than this.
   void settle(std::chrono::milliseconds at_most) const;
 
@@ -78,24 +85,20 @@ class FlightLoop {
 
   void run();
   void turn(FlightTick& tick);
+  void pass_wish_on();
   [[nodiscard]] bool become_real_time() const;
 
   FlightConfig config_;
-  SetpointGate gate_;
+  FlightControl control_;
   std::unique_ptr<Autopilot> autopilot_;
   TrajectoryFollower follower_;  // of the thread that offers
   std::unique_ptr<Mailboxes> mailboxes_;
   std::atomic<bool> is_stopping_{false};
-  std::atomic<bool> is_landing_{false};
+  enum class Wish : std::uint8_t { kNone, kArm, kDisarm, kKill };
+  std::atomic<Wish> wish_{Wish::kNone};  // not yet passed on
   std::atomic<bool> is_real_time_{false};
   std::atomic<std::uint64_t> lost_ticks_{0};
   std::thread thread_;
 };
-
-[[nodiscard]] Setpoint to_setpoint(const TrajectoryPoint& point);
-
-// Wall-clock time as trajectories use it.
-[[nodiscard]] Time wall_time();
-[[nodiscard]] std::int64_t steady_ns();
 
 }  // namespace understory

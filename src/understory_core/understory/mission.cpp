@@ -60,6 +60,8 @@ const char* to_string(StopReason reason) {
       return "sensor_lost";
     case StopReason::kStageFailed:
       return "stage_failed";
+    case StopReason::kTrackingLost:
+      return "tracking_lost";
   }
   return "?";
 }

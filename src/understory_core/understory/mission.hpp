@@ -57,6 +57,7 @@ enum class StopReason : std::uint8_t {
   kLandRequested,
   kSensorLost,
   kStageFailed,
+  kTrackingLost,
 };
 [[nodiscard]] const char* to_string(StopReason reason);
 

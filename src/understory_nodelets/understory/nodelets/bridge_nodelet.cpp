@@ -3,26 +3,27 @@
 //
 // The bridge's side in ROS. The flight thread itself is FlightLoop; here trajectories go in, and on
 // a thread of its own telemetry comes out. In: trajectory, status (landing). Out: odometry, tf2
-// map -> body, flight_status, flight_timing, flown_path. When unloaded it first lets the vehicle
-// come to rest.
+// map -> body, flight_status, flight_timing, flown_path. Services arm, disarm (in flight: land
+// here) and kill (motors off, wherever it is). When unloaded it first lets the vehicle come to
+// rest.
 #include <atomic>
 #include <memory>
 #include <thread>
 
 #include <nav_msgs/Path.h>
 #include <pluginlib/class_list_macros.hpp>
+#include <std_srvs/Trigger.h>
 #include <sys/mman.h>
 #include <tf2_ros/transform_broadcaster.h>
 #include <understory_msgs/FlightStatus.h>
 #include <understory_msgs/FlightTiming.h>
 
 #include "understory/bridge/flight_loop.hpp"
+#include "understory/nodelets/autopilot_setup.hpp"
 #include "understory/nodelets/conversions.hpp"
 #include "understory/nodelets/flight_setup.hpp"
 #include "understory/nodelets/guarded_nodelet.hpp"
 #include "understory/nodelets/trajectory_update.hpp"
-#include "understory/sim/mission_record.hpp"
-#include "understory/sim/simulated_autopilot.hpp"
 
 namespace understory {
 namespace {
@@ -33,15 +34,6 @@ constexpr double kStatusPeriodS = 0.1;
 constexpr double kTimingPeriodS = 0.5;
 constexpr double kPathPeriodS = 0.2;
 constexpr std::size_t kMostPathPoses = 20000;
-
-std::unique_ptr<Autopilot> make_autopilot(const FlightSetup& setup) {
-  const World world(setup.config, setup.seed);
-  return std::make_unique<SimulatedAutopilot>(world.config.vehicle,
-                                              world.config.control,
-                                              world.start_m(),
-                                              world.config.scene.start.yaw_rad,
-                                              Rng(setup.seed).fork("wind"));
-}
 
 }  // namespace
 
@@ -68,6 +60,7 @@ class BridgeNodelet : public GuardedNodelet {
     }
     const FlightSetup setup = load_flight_setup(nh);
     frames_ = setup.onboard.frames;
+    is_auto_armed_ = setup.onboard.bus.auto_arm;
     path_.header.frame_id = frames_.map;
     odometry_publisher_ = nh.advertise<nav_msgs::Odometry>("odometry", 100);
     status_publisher_ = nh.advertise<understory_msgs::FlightStatus>("flight_status", 10);
@@ -77,11 +70,27 @@ class BridgeNodelet : public GuardedNodelet {
     is_locked_ = mlockall(MCL_CURRENT | MCL_FUTURE | MCL_ONFAULT) == 0;
     flight_ = std::make_unique<FlightLoop>(
         setup.onboard.flight, setup.config.scene.box.box_m(), make_autopilot(setup));
+    advertise_service("arm", &FlightLoop::arm);
+    advertise_service("disarm", &FlightLoop::disarm);
+    advertise_service("kill", &FlightLoop::kill);
     telemetry_thread_ = std::thread([this] { publish_telemetry(); });
     const ros::TransportHints hints = ros::TransportHints().tcpNoDelay();
     trajectory_subscriber_ =
         nh.subscribe("trajectory", 10, &BridgeNodelet::on_trajectory, this, hints);
     mission_subscriber_ = nh.subscribe("status", 10, &BridgeNodelet::on_mission, this, hints);
+  }
+
+  // What becomes of it, flight_status tells.
+  void advertise_service(const char* name, void (FlightLoop::*wish)()) {
+    const boost::function<bool(std_srvs::Trigger::Request&, std_srvs::Trigger::Response&)> serve =
+        [this, wish](std_srvs::Trigger::Request&, std_srvs::Trigger::Response& response) {
+          (*flight_.*wish)();
+          is_auto_armed_ = false;  // from then on only who asks
+          response.success = 1;
+          response.message = "asked for; see flight_status";
+          return true;
+        };
+    services_.push_back(getNodeHandle().advertiseService(name, serve));
   }
 
   void on_trajectory(const TrajectoryUpdatePtr& update) {
@@ -99,7 +108,7 @@ class BridgeNodelet : public GuardedNodelet {
   void on_mission(const understory_msgs::MissionStatusConstPtr& status) {
     guarded([&] {
       if (status->state == understory_msgs::MissionStatus::LAND) {
-        flight_->land();
+        flight_->disarm();
       }
     });
   }
@@ -112,14 +121,49 @@ class BridgeNodelet : public GuardedNodelet {
     }
   }
 
-  void publish(const FlightTick& tick) {
-    gate_violations_ = tick.gate_violations;
-    timing_.due_ns.push_back(static_cast<std::uint64_t>(tick.due_ns));
-    timing_.woken_ns.push_back(static_cast<std::uint64_t>(tick.woken_ns));
+  // Once: what has landed or was lost is armed again only by who asks for it.
+  void arm_if_ready(const FlightTick& tick) {
+    if (is_auto_armed_ && tick.telemetry.link.host == can::HostState::kReady) {
+      is_auto_armed_ = false;
+      flight_->arm();
+    }
+  }
+
+  // The way of a trajectory's first setpoint over the bus.
+  void trace_bus(const FlightTick& tick) {
+    const LinkStatus& link = tick.telemetry.link;
+    if (is_answer_awaited_ && link.acked_set == awaited_set_) {
+      is_answer_awaited_ = false;
+      const std::int64_t offset_us =
+          tick.sent_ns / 1000 - tick.sent_wall.time_since_epoch().count();
+      const auto to_steady_ns = [&](Time time) {
+        return (time.time_since_epoch().count() + offset_us) * 1000;
+      };
+      trace("transmit", awaited_exposure_, awaited_sent_ns_, to_steady_ns(link.acked_sent));
+      trace("acknowledge",
+            awaited_exposure_,
+            to_steady_ns(link.acked_sent),
+            to_steady_ns(link.acked_received));
+    }
     if (tick.is_first_of_trajectory && tick.depth_stamp != Time{}) {
       trace("setpoint", to_ros(tick.depth_stamp), published_ns_, tick.sent_ns);
+      is_answer_awaited_ = true;
+      awaited_set_ = link.sets_sent;
+      awaited_exposure_ = to_ros(tick.depth_stamp);
+      awaited_sent_ns_ = tick.sent_ns;
     }
-    if (tick.telemetry.time <= telemetry_time_) {
+  }
+
+  void publish(const FlightTick& tick) {
+    gate_violations_ = tick.gate_violations;
+    problem_ = tick.telemetry.link.problem;
+    is_astray_ = tick.is_astray;
+    arm_if_ready(tick);
+    timing_.due_ns.push_back(static_cast<std::uint64_t>(tick.due_ns));
+    timing_.woken_ns.push_back(static_cast<std::uint64_t>(tick.woken_ns));
+    trace_bus(tick);
+    publish_slowly(tick, to_ros(tick.sent_wall));
+    if (!tick.telemetry.is_valid || tick.telemetry.time <= telemetry_time_) {
       return;  // nothing newer: tf2 takes a stamp once
     }
     telemetry_time_ = tick.telemetry.time;
@@ -134,11 +178,11 @@ class BridgeNodelet : public GuardedNodelet {
     transform.transform.rotation = odometry->pose.pose.orientation;
     broadcaster_.sendTransform(transform);
     odometry_publisher_.publish(nav_msgs::OdometryConstPtr(odometry));
-    publish_slowly(tick, *odometry);
+    publish_path(*odometry);
   }
 
-  void publish_slowly(const FlightTick& tick, const nav_msgs::Odometry& odometry) {
-    const ros::Time now = odometry.header.stamp;
+  // Also while nothing is heard of the vehicle.
+  void publish_slowly(const FlightTick& tick, const ros::Time& now) {
     if ((now - last_status_).toSec() >= kStatusPeriodS) {
       last_status_ = now;
       status_publisher_.publish(
@@ -151,6 +195,10 @@ class BridgeNodelet : public GuardedNodelet {
           boost::make_shared<const understory_msgs::FlightTiming>(std::move(timing_)));
       timing_ = understory_msgs::FlightTiming();
     }
+  }
+
+  void publish_path(const nav_msgs::Odometry& odometry) {
+    const ros::Time now = odometry.header.stamp;
     if ((now - last_path_).toSec() >= kPathPeriodS && path_.poses.size() < kMostPathPoses) {
       last_path_ = now;
       geometry_msgs::PoseStamped pose;
@@ -166,16 +214,10 @@ class BridgeNodelet : public GuardedNodelet {
 
   [[nodiscard]] understory_msgs::FlightStatus flight_status(const FlightTick& tick,
                                                             const ros::Time& now) const {
-    understory_msgs::FlightStatus status;
+    understory_msgs::FlightStatus status = to_msg(tick);
     status.header.stamp = now;
-    status.down = static_cast<std::uint8_t>(tick.telemetry.is_down);
-    status.at_rest = static_cast<std::uint8_t>(tick.is_at_rest);
     status.real_time = static_cast<std::uint8_t>(flight_->is_real_time());
-    status.trajectory_id = tick.trajectory_id;
-    status.gate_violations = tick.gate_violations;
-    status.skipped_deadlines = tick.skipped_deadlines;
     status.lost_ticks = flight_->lost_ticks();
-    status.rejected_inputs = tick.telemetry.rejected_inputs;
     return status;
   }
 
@@ -183,6 +225,13 @@ class BridgeNodelet : public GuardedNodelet {
     if (gate_violations_ > 0) {
       return {diagnostic_msgs::DiagnosticStatus::ERROR,
               "the gate refused " + std::to_string(gate_violations_) + " setpoints and held"};
+    }
+    if (is_astray_) {
+      return {diagnostic_msgs::DiagnosticStatus::ERROR, "the vehicle is not where its path is"};
+    }
+    const can::LinkProblem problem = problem_;
+    if (problem != can::LinkProblem::kNone) {
+      return {diagnostic_msgs::DiagnosticStatus::ERROR, can::to_string(problem)};
     }
     if (!flight_->is_real_time() || !is_locked_) {
       return {diagnostic_msgs::DiagnosticStatus::WARN,
@@ -198,11 +247,18 @@ class BridgeNodelet : public GuardedNodelet {
   std::atomic<bool> is_stopping_{false};
   std::atomic<std::int64_t> published_ns_{0};
   std::atomic<std::uint64_t> gate_violations_{0};
+  std::atomic<can::LinkProblem> problem_{can::LinkProblem::kNone};
+  std::atomic<bool> is_astray_{false};
+  std::atomic<bool> is_auto_armed_{false};  // still to be done
   // Of the telemetry thread.
   tf2_ros::TransformBroadcaster broadcaster_;
   understory_msgs::FlightTiming timing_;
   nav_msgs::Path path_;
   Time telemetry_time_{};
+  bool is_answer_awaited_ = false;
+  std::uint64_t awaited_set_ = 0;
+  ros::Time awaited_exposure_;
+  std::int64_t awaited_sent_ns_ = 0;
   ros::Time last_status_;
   ros::Time last_timing_;
   ros::Time last_path_;
@@ -212,6 +268,7 @@ class BridgeNodelet : public GuardedNodelet {
   ros::Publisher path_publisher_;
   ros::Subscriber trajectory_subscriber_;
   ros::Subscriber mission_subscriber_;
+  std::vector<ros::ServiceServer> services_;
 };
 
 }  // namespace understory

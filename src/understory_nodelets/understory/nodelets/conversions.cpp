@@ -49,6 +49,36 @@ Vector3d to_vector(const geometry_msgs::Point& point) {
   return {point.x, point.y, point.z};
 }
 
+understory_msgs::FlightStatus to_msg(const FlightTick& tick) {
+  const Telemetry& telemetry = tick.telemetry;
+  const LinkStatus& link = telemetry.link;
+  understory_msgs::FlightStatus msg;
+  msg.armed = static_cast<std::uint8_t>(telemetry.is_following);
+  msg.down = static_cast<std::uint8_t>(telemetry.is_down);
+  msg.astray = static_cast<std::uint8_t>(tick.is_astray);
+  msg.battery_low = static_cast<std::uint8_t>(telemetry.is_battery_low);
+  msg.at_rest = static_cast<std::uint8_t>(tick.is_at_rest);
+  msg.trajectory_id = tick.trajectory_id;
+  msg.gate_violations = tick.gate_violations;
+  msg.skipped_deadlines = tick.skipped_deadlines;
+  msg.host_state = can::to_string(link.host);
+  msg.problem = can::to_string(link.problem);
+  msg.vehicle_state = can::to_string(link.vehicle);
+  msg.vehicle_reason = can::to_string(link.reason);
+  msg.battery_percent = static_cast<float>(link.battery_percent);
+  msg.round_trip_ms = static_cast<float>(1e3 * to_seconds(link.round_trip));
+  msg.setpoints_sent = link.sets_sent;
+  msg.setpoints_not_flown = link.sets_not_flown;
+  msg.odometry_torn = link.sets_torn;
+  msg.frames_lost = link.frames_lost;
+  msg.frames_wrong = link.frames_wrong;
+  msg.tx_full = link.tx_full;
+  msg.tx_expired = link.tx_expired;
+  msg.bus_reopened = link.bus_reopened;
+  msg.sessions = link.sessions;
+  return msg;
+}
+
 nav_msgs::Odometry to_odometry(const Telemetry& telemetry,
                                const std::string& map_frame,
                                const std::string& body_frame) {
@@ -111,7 +141,7 @@ understory_msgs::MissionStatus to_msg(const MissionStatus& status) {
 
 std::optional<MissionStatus> from_msg(const understory_msgs::MissionStatus& msg) {
   using Msg = understory_msgs::MissionStatus;
-  if (msg.state > Msg::STOPPED || msg.stop_reason > Msg::STAGE_FAILED ||
+  if (msg.state > Msg::STOPPED || msg.stop_reason > Msg::TRACKING_LOST ||
       msg.mode > static_cast<std::uint8_t>(FlightMode::kBrake) ||
       msg.counter_names.size() != msg.counter_values.size()) {
     return std::nullopt;

@@ -12,9 +12,10 @@
 #include <nav_msgs/Odometry.h>
 #include <ros/time.h>
 #include <sensor_msgs/CameraInfo.h>
+#include <understory_msgs/FlightStatus.h>
 #include <understory_msgs/MissionStatus.h>
 
-#include "understory/bridge/autopilot.hpp"
+#include "understory/bridge/flight_loop.hpp"
 #include "understory/mission_status.hpp"
 
 namespace understory {
@@ -26,6 +27,8 @@ namespace understory {
 [[nodiscard]] Vector3d to_vector(const geometry_msgs::Point& point);
 
 // Twist in the body frame, as nav_msgs/Odometry has it.
+// Without what only the flight loop knows: header, real_time, lost_ticks.
+[[nodiscard]] understory_msgs::FlightStatus to_msg(const FlightTick& tick);
 [[nodiscard]] nav_msgs::Odometry to_odometry(const Telemetry& telemetry,
                                              const std::string& map_frame,
                                              const std::string& body_frame);

@@ -54,6 +54,9 @@ class ExplorerNodelet : public GuardedNodelet {
         [this, command](std_srvs::Trigger::Request&, std_srvs::Trigger::Response& response) {
           guarded([&] { response.success = static_cast<std::uint8_t>(obey(command)); });
           response.message = mission_ ? to_string(mission_->state()) : "no map yet";
+          if (command == Command::START && response.success == 0 && flight_.armed == 0) {
+            response.message = "not armed: " + flight_.vehicle_state + " " + flight_.vehicle_reason;
+          }
           return true;
         };
     services_.push_back(getNodeHandle().advertiseService(name, serve));
@@ -78,24 +81,52 @@ class ExplorerNodelet : public GuardedNodelet {
     guarded([&] { static_cast<void>(obey(command->command)); });
   }
 
-  // From then on the vehicle holds and is not where the mission takes it to be.
   void on_flight(const understory_msgs::FlightStatusConstPtr& flight) {
-    if (flight->gate_violations > 0 && !has_failed_) {
-      NODELET_ERROR("%s: the bridge's gate refused a setpoint: the mission ends here",
-                    getName().c_str());
-      guarded([this] { fail(); });
+    guarded([&] {
+      flight_ = *flight;
+      if (!mission_ || mission_->is_over()) {
+        return;
+      }
+      // From then on the vehicle holds and is not where the mission takes it to be.
+      if (flight->gate_violations > 0) {
+        fail(StopReason::kStageFailed, "the bridge's gate refused a setpoint");
+      } else if (flight->astray != 0) {
+        fail(StopReason::kTrackingLost, "the vehicle is not where its trajectory is");
+      } else if (mission_->state() == MissionState::kWaiting) {
+        start_when_armed();
+      } else if (flight->battery_low != 0 && mission_->stop_reason() == StopReason::kNone) {
+        NODELET_WARN("%s: the battery is low: back home", getName().c_str());
+        static_cast<void>(obey(Command::RETURN_HOME));
+      }
+    });
+  }
+
+  void start_when_armed() {
+    if (flight_.armed != 0 && is_start_wanted_) {
+      is_start_wanted_ = false;
+      static_cast<void>(obey(Command::START));
+      return;
+    }
+    const double waited_s = static_cast<double>(steady_ns() - first_map_ns_) * 1e-9;
+    const BusConfig& bus = setup_.onboard.bus;
+    if (is_start_wanted_ && bus.auto_arm && waited_s > bus.arming_patience_s) {
+      const std::string why = "not armed after " + std::to_string(bus.arming_patience_s) +
+                              " s: link: " + flight_.problem +
+                              "; vehicle: " + flight_.vehicle_state + " " + flight_.vehicle_reason;
+      fail(StopReason::kTakeOffFailed, why.c_str());
     }
   }
 
-  void on_failure() override { fail(); }
+  void on_failure() override { fail(StopReason::kStageFailed, "a stage has failed"); }
 
-  void fail() {
+  void fail(StopReason reason, const char* why) {
     if (!mission_ || has_failed_) {
       return;
     }
     has_failed_ = true;
+    NODELET_ERROR("%s: %s: the mission ends here", getName().c_str(), why);
     const Time now = to_time(ros::Time::now());
-    publish(mission_->stop(StopReason::kStageFailed, now));
+    publish(mission_->stop(reason, now));
     publish_status(now);
   }
 
@@ -107,7 +138,8 @@ class ExplorerNodelet : public GuardedNodelet {
     Mission::Answer answer;
     switch (command) {
       case Command::START:
-        answer.accepted = mission_->start(now);
+        // A trajectory does not wait for a vehicle that does not fly.
+        answer.accepted = flight_.armed != 0 && mission_->start(now);
         break;
       case Command::PAUSE:
         answer = mission_->pause(now);
@@ -143,7 +175,11 @@ class ExplorerNodelet : public GuardedNodelet {
         count("maps_before_odometry");
         return;
       }
-      mission_ = std::make_unique<Mission>(setup_.config.mission,
+      first_map_ns_ = begin_ns;
+      MissionConfig mission = setup_.config.mission;
+      is_start_wanted_ = mission.auto_start;
+      mission.auto_start = false;  // it starts once the vehicle is armed
+      mission_ = std::make_unique<Mission>(mission,
                                            setup_.config.explorer,
                                            map->geometry,
                                            start_state_->position_m,
@@ -246,7 +282,10 @@ class ExplorerNodelet : public GuardedNodelet {
   std::unique_ptr<MapReceiver> receiver_;
   std::optional<VehicleState> start_state_;
   std::unique_ptr<Mission> mission_;
+  understory_msgs::FlightStatus flight_;
+  bool is_start_wanted_ = false;
   bool has_failed_ = false;
+  std::int64_t first_map_ns_ = 0;
   std::int64_t last_map_ns_ = 0;
   Time last_shown_{};
   ros::Publisher trajectory_publisher_;

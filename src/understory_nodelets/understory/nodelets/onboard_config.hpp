@@ -7,6 +7,7 @@
 #include <string>
 
 #include "understory/bridge/flight_loop.hpp"
+#include "understory/nodelets/bus_config.hpp"
 
 namespace understory {
 
@@ -95,6 +96,7 @@ struct OnboardConfig {
   WatchConfig watch;
   PublishConfig publish;
   FlightConfig flight;
+  BusConfig bus;
 
   void visit(FieldVisitor& f) {
     f.section("cloud", cloud, "From depth images and LiDAR to clouds.");
@@ -102,6 +104,7 @@ struct OnboardConfig {
     f.section("watch", watch, "What is too late.");
     f.section("publish", publish, "What others may look at.");
     f.section("flight", flight, "The flight thread.");
+    f.section("bus", bus, "The vehicle at the other end.");
   }
 };
 

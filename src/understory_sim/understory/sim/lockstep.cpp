@@ -2,20 +2,20 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "understory/sim/lockstep.hpp"
 
+#include <algorithm>
 #include <utility>
-
-#include "understory/bridge/flight_loop.hpp"
 
 namespace understory {
 namespace {
 
-constexpr Duration kPhysicsStep = std::chrono::milliseconds(2);
 constexpr Duration kSetpointPeriod = std::chrono::milliseconds(10);
 // To stand on the ground or to hover still, after the mission's last word.
 constexpr Duration kSettleTime = std::chrono::seconds(8);
 
-Vector3d start_position(const StartConfig& start) {
-  return {start.x_m, start.y_m, start.z_m};
+// The vehicle flies once it is armed; the mission begins then.
+MissionConfig waiting(MissionConfig mission) {
+  mission.auto_start = false;
+  return mission;
 }
 
 Mapper make_mapper(const SimulationConfig& config, const MapSnapshot* resumed) {
@@ -43,43 +43,58 @@ Lockstep::Lockstep(const SimulationConfig& config,
       on_step_(std::move(on_step)),
       times_(times),
       stages_(times),
-      vehicle_(config.vehicle,
-               start_position(config.scene.start),
-               config.scene.start.yaw_rad,
-               rng.fork("wind")),
-      law_(config.vehicle.airframe, config.control),
+      bus_(vehicle_of(config),
+           can::HostStationConfig{},
+           world_from_start(config.scene.start),
+           rng,
+           Time{}),
+      control_(GateConfig{}, TrackingConfig{}, config.scene.box.box_m()),
       renderer_(forest),
       camera_(config.explorer.camera),
       body_from_optical_(body_from_optical(config.explorer.camera)),
       noise_rng_(rng.fork("depth noise")),
       mapper_(make_mapper(config, resumed)),
-      mission_(config.mission,
+      mission_(waiting(config.mission),
                config.explorer,
                mapper_.geometry(),
-               start_position(config.scene.start),
+               bus_.vehicle().state().position_m,
                config.scene.start.yaw_rad,
                Time{}) {
-  law_.set_mode(ControlMode::kTrack);
-  mapper_.mark_free(launch_site_m(config.mission, start_position(config.scene.start)), Time{});
+  mapper_.mark_free(launch_site_m(config.mission, bus_.vehicle().state().position_m), Time{});
 }
 
-Setpoint Lockstep::setpoint_now() {
-  if (now_ >= setpoint_time_ + kSetpointPeriod || now_ == Time{}) {
-    setpoint_ = to_setpoint(mission_.pilot().follower().sample(now_));
-    setpoint_time_ = now_;
+void Lockstep::follow_vehicle(const Telemetry& telemetry) {
+  if (mission_.state() == MissionState::kWaiting) {
+    if (telemetry.is_following) {
+      mission_.start(now_);
+    } else if (telemetry.link.host == can::HostState::kReady) {
+      bus_.host().arm();
+    }
+  } else if (mission_.state() == MissionState::kLand) {
+    bus_.host().disarm();
+  } else if (control_.is_astray()) {
+    mission_.stop(StopReason::kTrackingLost, now_);
+  } else if (telemetry.is_battery_low && mission_.stop_reason() == StopReason::kNone) {
+    mission_.return_home(now_);
   }
-  return extrapolated(setpoint_, to_seconds(now_ - setpoint_time_));
+  is_down_ = telemetry.is_down;
+}
+
+void Lockstep::fly_tick() {
+  const Telemetry telemetry = bus_.host().receive(now_);
+  const FlightDecision decision = control_.decide(&mission_.pilot().follower(), telemetry, now_);
+  bus_.host().send(decision.setpoint, decision.is_hold, now_);
+  follow_vehicle(telemetry);
+  next_tick_ += kSetpointPeriod;
 }
 
 void Lockstep::fly_until(Time exposure) {
-  const double step_s = to_seconds(kPhysicsStep);
-  if (mission_.state() == MissionState::kLand && law_.mode() == ControlMode::kTrack) {
-    law_.set_mode(ControlMode::kLand);
-  }
   while (now_ < exposure) {
-    vehicle_.step(law_.update(vehicle_.state(), setpoint_now(), step_s), step_s);
-    now_ += kPhysicsStep;
-    on_step_(now_, vehicle_.state());
+    if (now_ >= next_tick_) {
+      fly_tick();
+    }
+    now_ = std::min(next_tick_, exposure);
+    bus_.advance(now_, on_step_);
   }
 }
 
@@ -105,8 +120,8 @@ LockstepFrame Lockstep::advance() {
     fly_until(exposure);
   }
   Pose world_from_body = Pose::Identity();
-  world_from_body.translation() = vehicle_.state().position_m;
-  world_from_body.linear() = vehicle_.state().world_from_body.toRotationMatrix();
+  world_from_body.translation() = vehicle().position_m;
+  world_from_body.linear() = vehicle().world_from_body.toRotationMatrix();
   const Pose world_from_optical = world_from_body * body_from_optical_;
   {
     const StageTimer timer(times_, stages_.camera);
@@ -133,11 +148,9 @@ bool Lockstep::is_over() const {
   if (!mission_.is_over()) {
     return false;
   }
-  const bool is_down = law_.mode() == ControlMode::kIdle;
   const bool is_still = mission_.state() == MissionState::kStopped &&
-                        mission_.pilot().is_at_rest(now_) &&
-                        vehicle_.state().velocity_mps.norm() < 0.05;
-  return is_down || is_still || now_ >= over_since_ + kSettleTime;
+                        mission_.pilot().is_at_rest(now_) && vehicle().velocity_mps.norm() < 0.05;
+  return is_down_ || is_still || now_ >= over_since_ + kSettleTime;
 }
 
 }  // namespace understory

@@ -1,19 +1,21 @@
 // Copyright 2026 the Understory authors
 // SPDX-License-Identifier: BSD-3-Clause
 //
-// One mission in lockstep: physics and control law at 500 Hz, setpoints at 100 Hz, camera, map and
-// decisions at the camera's rate, all on one thread and one virtual clock. The same configuration,
-// forest and seed give the same flight, bit for bit. World frame, SI units. Construction throws on
-// wrong configuration; flying does not throw.
+// One mission in lockstep: physics and control law at 500 Hz, setpoints at 100 Hz over a bus in
+// memory, camera, map and decisions at the camera's rate, all on one thread and one virtual clock.
+// The mission starts once the vehicle is armed. The same configuration, forest and seed give the
+// same flight and the same frames, bit for bit. World frame, SI units. Construction throws on wrong
+// configuration; flying does not throw.
 #pragma once
 
 #include <functional>
 
-#include "understory/autopilot/control_law.hpp"
 #include "understory/base/rng.hpp"
+#include "understory/bridge/flight_control.hpp"
 #include "understory/map/mapper.hpp"
 #include "understory/mission.hpp"
 #include "understory/sim/depth_renderer.hpp"
+#include "understory/sim/simulated_bus.hpp"
 #include "understory/sim/simulation_config.hpp"
 #include "understory/sim/stage_times.hpp"
 
@@ -27,7 +29,7 @@ struct LockstepFrame {
 
 class Lockstep {
  public:
-  using StepHook = std::function<void(Time, const VehicleState&)>;
+  using StepHook = SimulatedBus::StepHook;
 
   // `resumed`: go on from this map instead of an unknown one. `on_step` sees the true vehicle at
   // every physics step; `times` collects wall times per stage.
@@ -48,7 +50,10 @@ class Lockstep {
 
   [[nodiscard]] Time now() const { return now_; }
   [[nodiscard]] const Mission& mission() const { return mission_; }
-  [[nodiscard]] const VehicleState& vehicle() const { return vehicle_.state(); }
+  [[nodiscard]] const VehicleState& vehicle() const { return bus_.vehicle().state(); }
+  // Sees every frame on the bus.
+  void set_tap(std::shared_ptr<can::FrameTap> tap) { bus_.host().node().set_tap(std::move(tap)); }
+  [[nodiscard]] std::uint64_t gate_violations() const { return control_.gate_violations(); }
   [[nodiscard]] std::uint64_t skipped_frames() const { return skipped_frames_; }
 
  private:
@@ -64,14 +69,15 @@ class Lockstep {
   void fly_until(Time exposure);
   [[nodiscard]] DepthImage expose(const Pose& world_from_optical);
   [[nodiscard]] MissionStep decide(const MapSnapshotPtr& map);
-  [[nodiscard]] Setpoint setpoint_now();
+  void fly_tick();
+  void follow_vehicle(const Telemetry& telemetry);
 
   SimulationConfig config_;
   StepHook on_step_;
   StageTimes& times_;
   Stages stages_;
-  Vehicle vehicle_;
-  ControlLaw law_;
+  SimulatedBus bus_;
+  FlightControl control_;
   DepthRenderer renderer_;
   CameraModel camera_;
   Pose body_from_optical_;
@@ -80,8 +86,8 @@ class Lockstep {
   Mission mission_;
   Time now_{};
   std::int64_t frame_ = 0;
-  Setpoint setpoint_;
-  Time setpoint_time_{};
+  Time next_tick_{};
+  bool is_down_ = false;
   DepthImage image_;
   Time over_since_{};
   std::uint64_t skipped_frames_ = 0;

@@ -126,7 +126,7 @@ MissionResult MissionRecord::result(const MissionStatus& last, Time now) const {
   result.completed = last.stop_reason == StopReason::kNothingLeft;
   result.stop_reason = to_string(last.stop_reason);
   if (result.completed && last.explored_at) {
-    result.completion_time_s = to_seconds(*last.explored_at - start_);
+    result.completion_time_s = to_seconds(*last.explored_at - last.started_at);
   }
   result.mission_time_s = to_seconds(now - start_);
   add_score(scorer_.score(), result);

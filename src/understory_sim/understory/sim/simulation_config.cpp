@@ -43,6 +43,23 @@ Box3d BoxConfig::box_m() const {
   return box;
 }
 
+SimulatedVehicleConfig vehicle_of(const SimulationConfig& config) {
+  SimulatedVehicleConfig vehicle;
+  vehicle.vehicle = config.vehicle;
+  vehicle.control = config.control;
+  vehicle.power = config.power;
+  vehicle.supervisor = config.autopilot;
+  return vehicle;
+}
+
+Pose world_from_start(const StartConfig& start) {
+  Pose world_from_start = Pose::Identity();
+  world_from_start.translation() = Vector3d(start.x_m, start.y_m, start.z_m);
+  world_from_start.linear() =
+      Eigen::AngleAxisd(start.yaw_rad, Vector3d::UnitZ()).toRotationMatrix();
+  return world_from_start;
+}
+
 void adapt_box(SceneConfig& scene) {
   if (scene.source != "file" || scene.crop_mode == "none") {
     return;

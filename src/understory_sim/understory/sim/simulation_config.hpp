@@ -12,7 +12,7 @@
 #include "understory/mission.hpp"
 #include "understory/sim/depth_noise.hpp"
 #include "understory/sim/forest_generator.hpp"
-#include "understory/sim/vehicle.hpp"
+#include "understory/sim/simulated_vehicle.hpp"
 
 namespace understory {
 
@@ -104,6 +104,8 @@ struct SimulationConfig {
   MissionConfig mission;
   VehicleConfig vehicle;
   ControlConfig control;
+  PowerConfig power;
+  can::SupervisorConfig autopilot;
   DepthNoiseConfig depth_noise;
   ExplorerConfig explorer;
 
@@ -112,10 +114,15 @@ struct SimulationConfig {
     f.section("mission", mission, "The mission around the exploration.");
     f.section("vehicle", vehicle, "The true vehicle.");
     f.section("control", control, "The autopilot's control law.");
+    f.section("power", power, "ESCs and battery of the true vehicle.");
+    f.section("autopilot", autopilot, "What the autopilot makes of silence and odd setpoints.");
     f.section("depth_noise", depth_noise, "What the simulated camera does wrong.");
     explorer.visit(f);
   }
 };
+
+[[nodiscard]] SimulatedVehicleConfig vehicle_of(const SimulationConfig& config);
+[[nodiscard]] Pose world_from_start(const StartConfig& start);
 
 // Gives the box the size of the crop, centred on (0, 0); build_forest does so as well.
 void adapt_box(SceneConfig& scene);

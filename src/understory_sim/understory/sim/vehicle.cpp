@@ -105,16 +105,20 @@ void Vehicle::step(const MotorCommands& commands, double step_s) {
   state_.position_m += step_s * (state_.velocity_mps + 0.5 * step_s * acceleration_mps2_);
   state_.velocity_mps += step_s * acceleration_mps2_;
 
-  const bool was_on_ground = on_ground_;
-  on_ground_ = state_.position_m.z() <= config_.gear_height_m && state_.velocity_mps.z() <= 0.0;
+  const bool was_standing = on_ground_ || is_in_launcher_;
+  is_in_launcher_ = is_in_launcher_ && acceleration_mps2_.z() <= 0.0;
+  const bool is_low = state_.position_m.z() <= config_.gear_height_m;
+  on_ground_ = is_in_launcher_ || (is_low && state_.velocity_mps.z() <= 0.0);
   if (on_ground_) {
-    stand_on_ground(was_on_ground ? stood_at_m_ : state_.position_m, step_s);
+    const Vector3d on_ground_m(
+        state_.position_m.x(), state_.position_m.y(), config_.gear_height_m);
+    stand(was_standing ? stood_at_m_ : on_ground_m, step_s);
   }
 }
 
 // Legs neither bounce nor slide, and bring the body level while its heading stays.
-void Vehicle::stand_on_ground(const Vector3d& position_m, double step_s) {
-  stood_at_m_ = {position_m.x(), position_m.y(), config_.gear_height_m};
+void Vehicle::stand(const Vector3d& position_m, double step_s) {
+  stood_at_m_ = position_m;
   state_.position_m = stood_at_m_;
   state_.velocity_mps.setZero();
   state_.body_rates_radps.setZero();

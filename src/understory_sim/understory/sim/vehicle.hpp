@@ -57,14 +57,17 @@ class Vehicle {
   [[nodiscard]] const Vector3d& acceleration_mps2() const { return acceleration_mps2_; }
   [[nodiscard]] const std::array<double, 4>& motor_thrusts_n() const { return thrusts_n_; }
   [[nodiscard]] Vector3d wind_mps() const { return mean_wind_mps_ + gust_mps_; }
+  // Or still in the launcher.
   [[nodiscard]] bool on_ground() const { return on_ground_; }
+  // Where it starts, until the motors carry it.
+  void hang_in_launcher() { is_in_launcher_ = true; }
   // Puts the vehicle into a state in mid-flight with the motors at hover thrust.
   void set_state(const VehicleState& state);
 
  private:
   void step_gust(double step_s);
   [[nodiscard]] Vector3d force_n(double thrust_n) const;
-  void stand_on_ground(const Vector3d& position_m, double step_s);
+  void stand(const Vector3d& position_m, double step_s);
 
   VehicleConfig config_;
   Vector3d inertia_kgm2_;
@@ -76,6 +79,7 @@ class Vehicle {
   std::array<double, 4> thrusts_n_{};
   Vector3d gust_mps_ = Vector3d::Zero();
   bool on_ground_ = false;
+  bool is_in_launcher_ = false;
   Vector3d stood_at_m_ = Vector3d::Zero();  // of use only while on the ground
 };
 
