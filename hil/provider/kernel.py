@@ -1,0 +1,106 @@
+# Copyright 2026 the Understory authors
+# SPDX-License-Identifier: BSD-3-Clause
+"""A kernel that runs as a process of the host, from its folder for logs to its last child."""
+
+import contextlib
+import os
+import shutil
+import signal
+import socket
+import subprocess
+import tempfile
+from pathlib import Path
+from types import TracebackType
+from typing import Dict, List, Optional, Tuple, Type
+
+from job import HilError, Job
+from relay import Relay
+
+HERE = Path(__file__).resolve().parent
+NEEDED_INSIDE = {"ip": "iproute2", "tc": "iproute2", "modprobe": "kmod", "mount": "mount"}
+PYTHON = "/usr/bin/python3"
+LOG_LINES_SHOWN = 20
+
+
+def find_program(name: str) -> Optional[str]:
+    return shutil.which(name, path="/usr/sbin:/usr/bin:/sbin:/bin")
+
+
+def inside_needs() -> Optional[str]:
+    """What a booted kernel would not find on this machine."""
+    for name, package in NEEDED_INSIDE.items():
+        if find_program(name) is None:
+            return f"{name} is not there (package {package})"
+    if not os.access(PYTHON, os.X_OK):
+        return f"{PYTHON} is not there (package python3)"
+    return None
+
+
+class KernelRun(contextlib.AbstractContextManager):  # type: ignore[type-arg]
+    """A private folder and the processes of one kernel; both are gone afterwards."""
+
+    def __init__(self, name: str) -> None:
+        self._name = name
+        self._kernel: Optional["subprocess.Popen[bytes]"] = None
+        parent = tempfile.gettempdir()
+        # The kernel's command line has no way to write a space.
+        self.folder = Path(tempfile.mkdtemp(prefix="understory-hil-", dir=parent if " " not in parent else "/tmp"))
+        # Whatever the path of the project is, this one is short and plain.
+        (self.folder / "provider").symlink_to(HERE)
+
+    @staticmethod
+    def boot_arguments(job: Job, folder: Path, channel: str, modules: Path) -> List[str]:
+        settings = {
+            "HIL_CHANNEL": channel,
+            "HIL_MODULES": modules,
+            "HIL_INTERFACES": job.interfaces,
+            "HIL_ECHO": int(job.is_echo),
+            "HIL_BITRATE": job.bitrate or "",
+            "HIL_QUEUE": job.queue,
+        }
+        return [f"init={folder}/provider/init.sh", *(f"{k}={v}" for k, v in settings.items())]
+
+    def start(
+        self, command: List[str], environment: Dict[str, str], kept_files: Tuple[int, ...]
+    ) -> "subprocess.Popen[bytes]":
+        """In a session of its own: a Ctrl-C of the terminal is for the command inside."""
+        with open(self._log(), "wb") as log:
+            self._kernel = subprocess.Popen(
+                command,
+                cwd="/",
+                env=environment,
+                pass_fds=kept_files,
+                stdin=subprocess.DEVNULL,
+                stdout=log,
+                stderr=log,
+                start_new_session=True,
+            )
+        return self._kernel
+
+    def relay(self, channel: socket.socket, job: Job) -> int:
+        try:
+            return Relay(channel, job).run(self._name)
+        except HilError as error:
+            raise HilError(f"{error} (its log: {self._kept_log()})") from None
+
+    def _log(self) -> Path:
+        return self.folder / "kernel.log"
+
+    def _kept_log(self) -> Path:
+        number, path = tempfile.mkstemp(prefix="understory-hil-", suffix=".log")
+        os.close(number)
+        shutil.copyfile(self._log(), path)
+        return Path(path)
+
+    def __exit__(
+        self,
+        kind: Optional[Type[BaseException]],
+        value: Optional[BaseException],
+        trace: Optional[TracebackType],
+    ) -> None:
+        # The agent has written everything to the disk before it said that the command ended.
+        if self._kernel is not None:
+            with contextlib.suppress(ProcessLookupError):
+                os.killpg(self._kernel.pid, signal.SIGKILL)
+            self._kernel.wait()
+        shutil.rmtree(self.folder, ignore_errors=True)
