@@ -2,14 +2,37 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "understory/nodelets/autopilot_setup.hpp"
 
+#include <random>
+
 #include "understory/bridge/clocks.hpp"
+#include "understory/port/socket_can_port.hpp"
 #include "understory/sim/mission_record.hpp"
 #include "understory/sim/simulated_bus.hpp"
 
 namespace understory {
+namespace {
+
+constexpr const char* kMemory = "memory";
+
+std::unique_ptr<Autopilot> can_autopilot(const BusConfig& bus) {
+  can::IdSet ids;
+  for (const can::MessageInfo& message : can::kMessages) {
+    ids[message.id] = true;
+  }
+  // No seed: two hosts must not have the same number.
+  std::random_device chance;
+  return std::make_unique<CanAutopilot>(std::make_unique<can::SocketCanPort>(bus.interface, ids),
+                                        bus.link,
+                                        static_cast<std::uint16_t>(chance()));
+}
+
+}  // namespace
 
 std::unique_ptr<Autopilot> make_autopilot(const FlightSetup& setup) {
   const BusConfig& bus = setup.onboard.bus;
+  if (bus.interface != kMemory) {
+    return can_autopilot(bus);
+  }
   const World world(setup.config, setup.seed);
   return std::make_unique<InProcessAutopilot>(
       std::make_unique<SimulatedBus>(vehicle_of(world.config),

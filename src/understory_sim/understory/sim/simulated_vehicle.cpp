@@ -23,7 +23,8 @@ SimulatedVehicle::SimulatedVehicle(const SimulatedVehicleConfig& config,
                                    const Pose& world_from_start,
                                    const Rng& rng,
                                    std::unique_ptr<can::CanPort> port)
-    : node_(std::move(port), can::vehicle_node_config()),
+    : config_(config),
+      node_(std::move(port), can::vehicle_node_config()),
       vehicle_(config.vehicle,
                world_from_start.translation(),
                yaw_of(Eigen::Quaterniond(world_from_start.linear())),
@@ -36,6 +37,10 @@ SimulatedVehicle::SimulatedVehicle(const SimulatedVehicleConfig& config,
 void SimulatedVehicle::fail_esc(std::size_t index) {
   has_failed_[index] = true;
   power_.fail_esc(index);
+}
+
+void SimulatedVehicle::restart_autopilot(const Rng& rng) {
+  station_ = can::VehicleStation(station_config(config_), rng);
 }
 
 can::VehicleReadings SimulatedVehicle::readings() const {

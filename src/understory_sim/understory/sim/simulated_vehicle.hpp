@@ -50,6 +50,8 @@ class SimulatedVehicle : private can::FrameHandler {
   void lose_sensors() { has_sensors_ = false; }
   void drain_battery(double charge_percent) { power_.drain(charge_percent); }
   void fail_esc(std::size_t index);
+  // As after its power was off for a moment; the world goes on.
+  void restart_autopilot(const Rng& rng);
 
   [[nodiscard]] const VehicleState& state() const { return vehicle_.state(); }
   [[nodiscard]] const can::VehicleStation& station() const { return station_; }
@@ -60,6 +62,7 @@ class SimulatedVehicle : private can::FrameHandler {
   void on_frame(const can::PortFrame& frame) override;
   [[nodiscard]] can::VehicleReadings readings() const;
 
+  SimulatedVehicleConfig config_;
   can::CanNode node_;
   Vehicle vehicle_;
   PowerTrain power_;
