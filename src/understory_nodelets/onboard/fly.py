@@ -1,8 +1,10 @@
 #!/usr/bin/python3
 # Copyright 2026 the Understory authors
 # SPDX-License-Identifier: BSD-3-Clause
-"""Flies a mission in real time: a ROS master, the onboard process, its live line, the report.
+"""Flies a mission in real time: a CAN bus, a vehicle on it, a ROS master, the onboard process with
+its live line, the report.
 
+Without --bus it runs itself again with a bus of its own (hil/provider).
 Exit status: that of the onboard process (0 completed without collision, 1 not so, 2 wrong use).
 """
 
@@ -16,12 +18,16 @@ import sys
 import time
 import xmlrpc.client
 from pathlib import Path
-from typing import List, Optional
+from typing import List, NoReturn, Optional
 
 DEFAULT_PORT = 11311
 MASTER_PATIENCE_S = 20.0
 STOP_PATIENCE_S = 30.0
-PASSED_ON = ("forest", "crop", "strategy", "speed-cap", "resume", "onboard-overrides")
+VEHICLE_PATIENCE_S = 1.0  # to find fault with its options and its bus
+MEMORY = "memory"
+OWN_BUS = "vcan0"
+PROVIDER = Path(__file__).resolve().parents[3] / "hil/provider/hil.py"
+PASSED_ON = ("forest", "crop", "strategy", "speed-cap", "resume")
 
 
 class FlyError(Exception):
@@ -32,7 +38,7 @@ def parse_arguments(words: List[str]) -> argparse.Namespace:
     parser = argparse.ArgumentParser(
         prog="understory fly",
         description="Flies one mission in real time: the onboard pipeline in one process, with a "
-        "simulated camera and vehicle, and a ROS master of its own.",
+        "simulated camera, over a real CAN bus to a vehicle stand-in, and a ROS master of its own.",
         epilog="While it flies, rostopic, rosbag, rviz and the services see it: set ROS_MASTER_URI "
         "as printed. Ctrl-C brings the vehicle to rest; results are written.",
     )
@@ -42,7 +48,20 @@ def parse_arguments(words: List[str]) -> argparse.Namespace:
     parser.add_argument("--camera-size", help="WxH of the simulated camera, in pixels")
     parser.add_argument("--overrides", default="", help="YAML over the scenario's keys")
     parser.add_argument("--master", help="URI of a running ROS master instead of an own one")
-    parser.add_argument("--onboard", help=argparse.SUPPRESS)  # the program, set by `understory`
+    parser.add_argument(
+        "--bus",
+        help="CAN interface to use as it is; memory: no CAN, a vehicle within the process "
+        "(default: vcan0 on a bus of its own, as `understory hil` makes it)",
+    )
+    parser.add_argument("--no-vehicle", action="store_true", help="there is one on the bus already")
+    parser.add_argument("--no-bus-log", action="store_true", help="no bus.log in the result folder")
+    parser.add_argument(
+        "--fault", action="append", default=[], metavar="SECONDS:COMMAND",
+        help="of the vehicle, counted from arming: freeze, resume, restart, lose_sensors, "
+        "drain PERCENT, fail_esc N",
+    )
+    parser.add_argument("--onboard", help=argparse.SUPPRESS)  # the programs, set by `understory`
+    parser.add_argument("--vehicle", help=argparse.SUPPRESS)
     parser.add_argument("--quiet", action="store_true", help="no live line")
     parser.add_argument("--no-report", action="store_true", help="no figures, no latency table")
     parser.add_argument("--forest", help="stem map (CSV) instead of the scenario's forest")
@@ -110,6 +129,49 @@ def start_master(log_path: Path) -> "tuple[subprocess.Popen, str]":
     return process, uri
 
 
+def start_vehicle(arguments: argparse.Namespace, folder: Path) -> subprocess.Popen:
+    """The stand-in, in a session of its own: it outlives the flight it is for."""
+    command = [arguments.vehicle or "understory_vehicle", "--interface", arguments.bus]
+    command += ["--scenario", arguments.scenario, "--seed", str(arguments.seed)]
+    command += ["--overrides", arguments.overrides] if arguments.overrides else []
+    command += ["--forest", str(Path(arguments.forest).resolve())] if arguments.forest else []
+    command += ["--crop", arguments.crop] if arguments.crop else []
+    for fault in arguments.fault:
+        command += ["--fault", fault]
+    log_path = folder / "vehicle.log"
+    with open(log_path, "w", encoding="utf-8") as log:
+        try:
+            process = subprocess.Popen(
+                command,
+                stdin=subprocess.DEVNULL,
+                stdout=log,
+                stderr=subprocess.STDOUT,
+                start_new_session=True,
+            )
+        except FileNotFoundError as error:
+            raise FlyError(f"{command[0]}: not found (./understory build makes it)") from error
+    try:
+        process.wait(VEHICLE_PATIENCE_S)
+    except subprocess.TimeoutExpired:
+        return process
+    said = log_path.read_text(encoding="utf-8").strip().splitlines()
+    raise FlyError(said[-1] if said else f"the vehicle ended with {process.returncode}")
+
+
+def bus_override(arguments: argparse.Namespace, folder: Path) -> str:
+    if arguments.bus == MEMORY:
+        return ""
+    log = ""
+    return f"bus: {{interface: {arguments.bus}{log}}}\n"
+
+
+def with_own_bus(words: List[str]) -> NoReturn:
+    """Once more, where there is a CAN bus."""
+    command = ["/usr/bin/python3", "-B", str(PROVIDER), "--"]
+    command += ["/usr/bin/python3", str(Path(__file__).resolve()), "--bus", OWN_BUS, *words]
+    os.execv(command[0], command)
+
+
 def stop(process: subprocess.Popen) -> None:
     if process.poll() is None:
         process.terminate()
@@ -125,6 +187,8 @@ def onboard_command(arguments: argparse.Namespace, folder: Path) -> List[str]:
     command += ["--seed", str(arguments.seed), "--result-folder", str(folder)]
     overrides = camera_override(arguments.camera_size) + arguments.overrides
     command += ["--overrides", overrides] if overrides else []
+    onboard = bus_override(arguments, folder) + (arguments.onboard_overrides or "")
+    command += ["--onboard-overrides", onboard] if onboard else []
     for name in PASSED_ON:
         value = getattr(arguments, name.replace("-", "_"))
         if value is not None:
@@ -184,11 +248,15 @@ def fly(arguments: argparse.Namespace) -> int:
     if not uri or not is_master(uri):
         master, uri = start_master(folder / "master.log")
     print(f"export ROS_MASTER_URI={uri}", flush=True)
+    vehicle = None
     try:
+        if arguments.bus != MEMORY and not arguments.no_vehicle:
+            vehicle = start_vehicle(arguments, folder)
         status = run_onboard(command, uri, master)
     finally:
-        if master is not None:
-            stop(master)
+        for process in (vehicle, master):
+            if process is not None:
+                stop(process)
     if status < 0:
         raise FlyError(f"the onboard process was killed by signal {-status}")
     if status == 2 or arguments.no_report or not (folder / "result.json").exists():
@@ -198,6 +266,8 @@ def fly(arguments: argparse.Namespace) -> int:
 
 def main() -> int:
     arguments = parse_arguments(sys.argv[1:])
+    if arguments.bus is None:
+        with_own_bus(sys.argv[1:])
     try:
         return fly(arguments)
     except FlyError as error:
