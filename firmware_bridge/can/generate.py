@@ -1,9 +1,10 @@
 #!/usr/bin/python3
 # Copyright 2026 the Understory authors
 # SPDX-License-Identifier: BSD-3-Clause
-"""From the DBC, the single source of the bus: C++ codec, golden frames, docs/can_protocol.md.
+"""From the DBC, the single source of the bus: C++ codec, golden frames, docs/can_protocol.md, and
+the tables with which Wireshark decodes the bus.
 
-usage: generate.py cpp DBC FOLDER | golden DBC FOLDER | docs DBC
+usage: generate.py cpp DBC FOLDER | golden DBC FOLDER | wireshark DBC FOLDER | docs DBC
 The frames of `golden` and `docs` are encoded in dbc.py and not by the C++ code, so that a test can
 hold the two against each other. Any violation of the protocol's layout rules ends with 1 and one
 line.
@@ -13,6 +14,7 @@ import sys
 from pathlib import Path
 
 from dbc import LayoutError, camel, enums, examples, physical, protocol_hash, read_messages
+from wireshark import write_wireshark
 
 LICENCE = "// Copyright 2026 the Understory authors\n// SPDX-License-Identifier: BSD-3-Clause\n"
 
@@ -213,7 +215,7 @@ def docs_text(messages):
 
 
 def main(words):
-    if len(words) < 2 or words[0] not in ("cpp", "golden", "docs"):
+    if len(words) < 2 or words[0] not in ("cpp", "golden", "wireshark", "docs"):
         print(__doc__, file=sys.stderr)
         return 2
     try:
@@ -222,8 +224,10 @@ def main(words):
             print(docs_text(messages))
         elif words[0] == "cpp":
             write_cpp(version, messages, Path(words[2]))
-        else:
+        elif words[0] == "golden":
             write_golden(messages, Path(words[2]))
+        else:
+            write_wireshark(messages, Path(words[2]))
     except (LayoutError, KeyError, IndexError, OSError) as error:
         print(f"generate.py: {error}", file=sys.stderr)
         return 1
