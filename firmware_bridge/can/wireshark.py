@@ -81,7 +81,7 @@ def write_wireshark(messages: List[Message], folder: Path) -> None:
     """Never over preferences that are somebody's own."""
     preferences = folder / "preferences"
     if preferences.exists() and MARK not in preferences.read_text(errors="replace"):
-        raise LayoutError(f"{preferences}: is a Wireshark configuration of its own; name another folder")
+        raise LayoutError(f"{preferences}: is somebody's own configuration; name another folder")
     folder.mkdir(parents=True, exist_ok=True)
     preferences.write_text(PREFERENCES, encoding="utf-8")
     for name, rows in tables(messages).items():
