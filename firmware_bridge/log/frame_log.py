@@ -103,8 +103,8 @@ class _Columns:
         time_ns = np.fromiter(map(int, seconds), np.int64, len(rows)) * 1_000_000_000
         padded = (text if len(text) == 9 else text.ljust(9, b"0") for text in fractions)
         time_ns += np.fromiter(map(int, padded), np.int64, len(rows))
-        for name in set(interfaces).difference(self.interfaces):
-            self.interfaces[name] = len(self.interfaces)
+        for name in dict.fromkeys(interfaces):
+            self.interfaces.setdefault(name, len(self.interfaces))
         for text in set(identifiers).difference(self.identifiers):
             self.identifiers[text] = _identifier(text)
         of_interface, known = self.interfaces, self.identifiers

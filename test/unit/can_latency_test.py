@@ -3,6 +3,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """`understory log --latency`: against delays that were put into made-up flights."""
 
+import dataclasses
 import pathlib
 import random
 import sys
@@ -57,6 +58,23 @@ class Latency(FlightTest):
         self.assertEqual(statistics_of(samples_of(log))["commit_to_ack"].count, 597)
         self.assertEqual(unanswered(log), 3)
         self.assertLess(statistics_of(samples_of(log))["commit_to_ack"].max_ms, 1)
+
+    def test_only_the_first_of_two_answers_counts(self):
+        frames = flight()
+        for frame in frames:
+            if frame.name == "SP_ACK":
+                frame.counter = 2 * frame.counter % 16
+        for at in reversed(number_of(frames, "SP_ACK")):
+            first = frames[at]
+            again = dataclasses.replace(
+                first, time_us=first.time_us + 1000, counter=first.counter + 1
+            )
+            frames.insert(at + 1, again)
+
+        row = statistics_of(samples_of(self.log(frames)))["commit_to_ack"]
+
+        self.assertEqual(row.count, 300)
+        self.assertLess(row.max_ms, 1)
 
     def test_setpoints_that_a_log_ends_with_are_not_unanswered(self):
         self.assertEqual(unanswered(self.log(drop(flight(), "SP_ACK", range(260, 300)))), 0)
