@@ -154,13 +154,14 @@ def _statistics(value_ms: np.ndarray) -> Statistics:
 
 
 def unanswered(log: Log) -> int:
-    """Setpoints without an answer, but for those just before the log's end."""
-    commits = fresh(log["SP_COMMIT"])
-    asked, _ = answers_of(commits, "SpSeq", fresh(log["SP_ACK"]), "AckSeq")
+    """Setpoints without an answer, but for those before the vehicle is there or the log's end."""
+    commits, acks = fresh(log["SP_COMMIT"]), fresh(log["SP_ACK"])
+    asked, _ = answers_of(commits, "SpSeq", acks, "AckSeq")
     has_answer = np.zeros(commits.count, dtype=bool)
     has_answer[asked] = True
     is_early = commits.time_ns < log.frames.time_ns.max() - ANSWER_NS
-    return int(np.count_nonzero(is_early & ~has_answer))
+    is_heard = commits.time_ns > (acks.time_ns[0] if acks.count else 0)
+    return int(np.count_nonzero(is_early & is_heard & ~has_answer))
 
 
 def table_text(statistics: Dict[str, Statistics]) -> str:

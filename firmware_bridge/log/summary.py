@@ -21,6 +21,9 @@ from streams import stream_of
 MOST_LINES = 40  # of each timeline
 BAD_RESULTS = ("STALE", "SEQUENCE", "LIMITS", "UNSUPPORTED")
 BAD_STATES = ("KILLED", "FAULT")
+FAILSAFE_STATES = ("HOLD", "LAND")  # but for these reasons:
+WANTED = ("NONE", "HOST_REQUEST")
+FLYING = ("ARMED", "HOLD", "LAND")
 LINK_ERRORS = {
     "CrcErr": "wrong checksums",
     "Lost": "lost",
@@ -117,14 +120,24 @@ def errors_of(summary: Dict[str, Any]) -> List[str]:
         if count:
             found.append(f"{station}: counted {count} {LINK_ERRORS[kind]} ({name})")
     for span in summary["vehicle"]:
-        if span["state"] in BAD_STATES:
+        is_failsafe = span["state"] in FAILSAFE_STATES and span["reason"] not in WANTED
+        if span["state"] in BAD_STATES or is_failsafe:
             found.append(f"vehicle: {span['state']} ({span['reason']}) at {span['begin_s']:.3f} s")
-    found += [
-        f"vehicle: {name} at {spans[0][0]:.3f} s"
-        for name, spans in summary["flags"].items()
-        if name not in HARMLESS_FLAGS
-    ]
+    for name, spans in summary["flags"].items():
+        if name == "FlagLate":  # nothing is late before the host has begun
+            spans = [each for each in spans if _in_flight(each, summary["vehicle"])]
+        if spans and name not in HARMLESS_FLAGS:
+            found.append(f"vehicle: {name} at {spans[0][0]:.3f} s")
     return found
+
+
+def _in_flight(span: Any, states: List[Dict[str, Any]]) -> bool:
+    begin_s, end_s = span
+    return any(
+        begin_s < each["end_s"] and end_s > each["begin_s"]
+        for each in states
+        if each["state"] in FLYING
+    )
 
 
 # --- for reading ---------------------------------------------------------------------------------

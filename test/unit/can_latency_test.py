@@ -79,6 +79,9 @@ class Latency(FlightTest):
     def test_setpoints_that_a_log_ends_with_are_not_unanswered(self):
         self.assertEqual(unanswered(self.log(drop(flight(), "SP_ACK", range(260, 300)))), 0)
 
+    def test_setpoints_before_the_vehicle_is_there_are_not_unanswered(self):
+        self.assertEqual(unanswered(self.log(drop(flight(), "SP_ACK", range(100)))), 0)
+
     def test_the_period_of_setpoints_shows_a_stall(self):
         frames = flight()
         for frame in frames:

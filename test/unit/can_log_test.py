@@ -235,8 +235,12 @@ class States(FlightTest):
     def test_what_the_stations_complain_about_is_an_error(self):
         frames = flight()
         states = number_of(frames, "VEH_STATE")
+        for at in states[:20]:
+            frames[at].raws["FlagLate"] = 1  # not yet flying
         for at in states[60:65]:
             frames[at].raws["FlagEscFailed"] = 1
+        for at in states[70:80]:
+            frames[at].raws.update(State=4, StateReason=3, FlagLate=1)
         for at in states[-3:]:
             frames[at].raws.update(State=7, StateReason=8)
         links = number_of(frames, "VEH_LINK")
@@ -250,7 +254,9 @@ class States(FlightTest):
         self.assertIn("vehicle: FAULT (LINK_FAULT) at 2.947 s", errors)
         self.assertIn("vehicle: counted 5 torn sets (VlTorn)", errors)
         self.assertIn("SP_ACK: 1 STALE", errors)
-        self.assertEqual(len(errors), 4)
+        self.assertIn("vehicle: HOLD (SETPOINT_SILENCE) at 1.407 s", errors)
+        self.assertIn("vehicle: FlagLate at 1.407 s", errors)
+        self.assertEqual(len(errors), 6)
 
     def test_a_station_of_another_protocol_is_an_error(self):
         frames = flight()
