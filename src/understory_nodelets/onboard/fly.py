@@ -161,7 +161,7 @@ def start_vehicle(arguments: argparse.Namespace, folder: Path) -> subprocess.Pop
 def bus_override(arguments: argparse.Namespace, folder: Path) -> str:
     if arguments.bus == MEMORY:
         return ""
-    log = ""
+    log = "" if arguments.no_bus_log else f", log_file: '{folder / 'bus.log'}'"
     return f"bus: {{interface: {arguments.bus}{log}}}\n"
 
 

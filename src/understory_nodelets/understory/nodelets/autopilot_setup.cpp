@@ -5,6 +5,7 @@
 #include <random>
 
 #include "understory/bridge/clocks.hpp"
+#include "understory/port/candump_writer.hpp"
 #include "understory/port/socket_can_port.hpp"
 #include "understory/sim/mission_record.hpp"
 #include "understory/sim/simulated_bus.hpp"
@@ -14,6 +15,15 @@ namespace {
 
 constexpr const char* kMemory = "memory";
 
+void log_frames(const BusConfig& bus, can::CanNode& node) {
+  if (!bus.log_file.empty()) {
+    can::CandumpLogConfig log;
+    log.path = bus.log_file;
+    log.interface = bus.interface;
+    node.set_tap(std::make_shared<can::CandumpWriter>(log));
+  }
+}
+
 std::unique_ptr<Autopilot> can_autopilot(const BusConfig& bus) {
   can::IdSet ids;
   for (const can::MessageInfo& message : can::kMessages) {
@@ -21,9 +31,12 @@ std::unique_ptr<Autopilot> can_autopilot(const BusConfig& bus) {
   }
   // No seed: two hosts must not have the same number.
   std::random_device chance;
-  return std::make_unique<CanAutopilot>(std::make_unique<can::SocketCanPort>(bus.interface, ids),
-                                        bus.link,
-                                        static_cast<std::uint16_t>(chance()));
+  auto autopilot =
+      std::make_unique<CanAutopilot>(std::make_unique<can::SocketCanPort>(bus.interface, ids),
+                                     bus.link,
+                                     static_cast<std::uint16_t>(chance()));
+  log_frames(bus, autopilot->node());
+  return autopilot;
 }
 
 }  // namespace
@@ -34,12 +47,13 @@ std::unique_ptr<Autopilot> make_autopilot(const FlightSetup& setup) {
     return can_autopilot(bus);
   }
   const World world(setup.config, setup.seed);
-  return std::make_unique<InProcessAutopilot>(
-      std::make_unique<SimulatedBus>(vehicle_of(world.config),
-                                     bus.link,
-                                     world_from_start(world.config.scene.start),
-                                     Rng(setup.seed),
-                                     wall_time()));
+  auto simulated = std::make_unique<SimulatedBus>(vehicle_of(world.config),
+                                                  bus.link,
+                                                  world_from_start(world.config.scene.start),
+                                                  Rng(setup.seed),
+                                                  wall_time());
+  log_frames(bus, simulated->host().node());
+  return std::make_unique<InProcessAutopilot>(std::move(simulated));
 }
 
 }  // namespace understory

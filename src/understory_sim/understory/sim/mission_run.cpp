@@ -45,6 +45,7 @@ MissionResult MissionRun::result() const {
   const Time now = lockstep_->now();
   MissionResult result = record_.result(status_of(lockstep_->mission(), now), now);
   result.counters["skipped_frames"] = lockstep_->skipped_frames();
+  result.counters["gate_violations"] = lockstep_->gate_violations();
   result.realtime_factor = realtime_factor();
   result.stages = times_.stats();
   return result;

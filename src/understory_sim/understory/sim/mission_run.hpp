@@ -31,6 +31,9 @@ class MissionRun {
   void fly(const std::function<bool()>& interrupted,
            const std::function<void(const TickRow&)>& on_frame);
 
+  // Sees every frame between host and vehicle.
+  void set_tap(std::shared_ptr<can::FrameTap> tap) { lockstep_->set_tap(std::move(tap)); }
+
   [[nodiscard]] MissionResult result() const;
   [[nodiscard]] const MapSnapshot& map() const { return *map_; }
   [[nodiscard]] const Forest& forest() const { return world_.truth->forest(); }

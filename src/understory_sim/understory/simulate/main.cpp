@@ -13,6 +13,7 @@
 #include <unistd.h>
 
 #include "understory/map/octomap_io.hpp"
+#include "understory/port/candump_writer.hpp"
 #include "understory/sim/live_line.hpp"
 #include "understory/sim/mission_run.hpp"
 #include "understory/simulate/options.hpp"
@@ -69,6 +70,27 @@ bool make_report(const std::string& folder) {
          WEXITSTATUS(status) == 0;
 }
 
+// Writes in step with the flight: no frame is lost, and the bytes are the same every time.
+class BusLog : public can::FrameTap {
+ public:
+  explicit BusLog(const std::string& path) : file_(config(path)) {}
+  void on_port_frame(const can::PortFrame& frame) override { file_.add(frame); }
+  void close() {
+    file_.flush();
+    if (const std::optional<std::string> error = file_.take_error()) {
+      throw ResultError(*error);
+    }
+  }
+
+ private:
+  static can::CandumpLogConfig config(const std::string& path) {
+    can::CandumpLogConfig log;
+    log.path = path;
+    return log;
+  }
+  can::CandumpFile file_;
+};
+
 int fly_one(const Options& options) {
   RunSetup setup;
   setup.config = load_scenario((fs::path(project_root()) / "config").string(), options.choice);
@@ -85,6 +107,11 @@ int fly_one(const Options& options) {
   prepare_result_folder(folder);
   catch_signals();
   MissionRun run(setup);
+  std::shared_ptr<BusLog> bus_log;
+  if (!options.bus_log.empty()) {
+    bus_log = std::make_shared<BusLog>(options.bus_log);
+    run.set_tap(bus_log);
+  }
   TickWriter ticks((fs::path(folder) / "ticks.csv").string());
   LiveLine live(options.quiet);
   TickRow last;
@@ -96,6 +123,9 @@ int fly_one(const Options& options) {
           });
   live.finish(last, run.realtime_factor());
   ticks.close();
+  if (bus_log) {
+    bus_log->close();
+  }
   run.write(folder);
   const MissionResult result = run.result();
   fmt::print("{}\n", summary_of(result));

@@ -48,6 +48,9 @@ ParsedOptions parse_options(int argc, char** argv) {
   app.add_option("--speed-cap", options.choice.speed_cap, "paper or strict");
   app.add_option("--resume", options.resume_file, "go on from a saved map (.ot, .bt)");
   app.add_option("--out", options.out_dir, "result folder (default: results/SCENARIO_SEED)");
+  app.add_option("--bus-log",
+                 options.bus_log,
+                 "every frame between host and vehicle, as candump -l writes it");
   app.add_flag("--quiet", options.quiet, "no live line");
   app.add_flag("--no-report", options.no_report, "no figures and report.html");
   app.add_flag("--print-parameters",

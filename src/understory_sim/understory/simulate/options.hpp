@@ -16,6 +16,7 @@ struct Options {
   ScenarioChoice choice;
   std::string resume_file;
   std::string out_dir;
+  std::string bus_log;
   std::uint64_t seed = 1;
   bool quiet = false;
   bool no_report = false;
