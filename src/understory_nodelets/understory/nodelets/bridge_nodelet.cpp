@@ -121,10 +121,11 @@ class BridgeNodelet : public GuardedNodelet {
     }
   }
 
-  // Once: what has landed or was lost is armed again only by who asks for it.
+  // For one flight: what has landed or was lost is armed again only by who asks for it.
   void arm_if_ready(const FlightTick& tick) {
-    if (is_auto_armed_ && tick.telemetry.link.host == can::HostState::kReady) {
+    if (tick.telemetry.is_following) {
       is_auto_armed_ = false;
+    } else if (is_auto_armed_ && tick.telemetry.link.host == can::HostState::kReady) {
       flight_->arm();
     }
   }
