@@ -272,6 +272,39 @@ TEST(CanNode, ASetOfFiveGoesOutBackToBackThroughAWindowOfTwo) {
   EXPECT_EQ(bus.bus.busy(), bus.record.echoes.back().stamp - Time() + Duration(3));
 }
 
+// One frame is on the bus and one of ours is before it in the controller; that one may have to let
+// one of another station pass. Behind a long queue in the kernel it would be hundreds.
+TEST(CanNode, AnUrgentFrameWaitsForThreeOthersAtMost) {
+  constexpr Duration kLongestFrame{135};
+  MemoryBus bus;
+  Rng rng(23);
+  Duration longest{0};
+  Time next_set{};
+  while (bus.bus.now() < at_ms(2000)) {
+    const Time now = bus.bus.now();
+    if (now >= next_set) {
+      next_set = now + Duration(700);  // the bus is nearly full
+      for (const std::uint16_t id : kSet) {
+        bus.host->send(frame_of(id, static_cast<std::uint8_t>(rng.below(16))), now);
+      }
+      bus.vehicle->send(frame_of(0x200), now);
+      bus.vehicle->poll(bus.answers);
+    }
+    bus.host->run_until(now + Duration(static_cast<std::int64_t>(rng.below(300))), bus.record);
+    const Time asked = bus.host->now();
+    bus.host->send(frame_of(0x010), asked);
+    const std::size_t before = bus.record.echoes.size();
+    bus.host->run_until(asked + Duration(600), bus.record);
+    for (std::size_t i = before; i < bus.record.echoes.size(); ++i) {
+      const PortFrame& echo = bus.record.echoes[i];
+      longest = echo.frame.id == 0x010 ? std::max(longest, echo.stamp - asked) : longest;
+    }
+  }
+
+  EXPECT_GT(longest, 2 * kLongestFrame);
+  EXPECT_LE(longest, 4 * kLongestFrame);
+}
+
 TEST(CanNode, AfterBusOffNothingOfTheOldSessionIsSent) {
   MemoryCanBus bus(kBitsPerSecond, Rng(3));
   std::unique_ptr<MemoryCanPort> owned = bus.open();

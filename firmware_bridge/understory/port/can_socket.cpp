@@ -63,16 +63,35 @@ timespec clock_now() {
   return now;
 }
 
+std::vector<can_filter> filters_for(const IdSet& ids) {
+  std::vector<can_filter> filters;
+  // Without these flags in the mask a filter lets remote and extended frames through as well.
+  const canid_t kinds = CAN_EFF_FLAG | CAN_RTR_FLAG;
+  if (ids.count() > CAN_RAW_FILTER_MAX) {
+    filters.push_back({0, kinds});
+    return filters;
+  }
+  for (std::size_t id = 0; id < kIdCount; ++id) {
+    if (ids[id]) {
+      filters.push_back({static_cast<canid_t>(id), CAN_SFF_MASK | kinds});
+    }
+  }
+  return filters;
+}
+
 }  // namespace
 
 struct CanSocket::Batch {
+  std::vector<can_filter> filters;
   std::array<can_frame, kBatch> frames{};
   std::array<std::array<unsigned char, kControlBytes>, kBatch> control{};
   std::array<iovec, kBatch> vectors{};
   std::array<mmsghdr, kBatch> messages{};
 };
 
-CanSocket::CanSocket(const IdSet& ids) : ids_(ids), batch_(std::make_unique<Batch>()) {}
+CanSocket::CanSocket(const IdSet& ids) : ids_(ids), batch_(std::make_unique<Batch>()) {
+  batch_->filters = filters_for(ids);
+}
 
 CanSocket::~CanSocket() = default;
 
@@ -125,18 +144,7 @@ void CanSocket::set_receive_buffer() {
 }
 
 int CanSocket::set_filters() {
-  std::vector<can_filter> filters;
-  // Without these flags in the mask a filter lets remote and extended frames through as well.
-  const canid_t kinds = CAN_EFF_FLAG | CAN_RTR_FLAG;
-  if (ids_.count() > CAN_RAW_FILTER_MAX) {
-    filters.push_back({0, kinds});
-  } else {
-    for (std::size_t id = 0; id < kIdCount; ++id) {
-      if (ids_[id]) {
-        filters.push_back({static_cast<canid_t>(id), CAN_SFF_MASK | kinds});
-      }
-    }
-  }
+  const std::vector<can_filter>& filters = batch_->filters;
   const auto size = static_cast<socklen_t>(filters.size() * sizeof(can_filter));
   return ::setsockopt(fd_.get(), SOL_CAN_RAW, CAN_RAW_FILTER, filters.data(), size) == 0 ? 0
                                                                                          : errno;

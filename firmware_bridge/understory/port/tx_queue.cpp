@@ -160,8 +160,14 @@ void TxQueue::confirm(const Frame& frame, Time now) {
   if (found == end) {
     ++counters_.unknown_echoes;
   } else {
+    // What was sent before has lost its echo: it would have come first.
+    const auto overtaken = static_cast<std::size_t>(found - begin);
+    for (std::size_t i = 0; i < overtaken; ++i) {
+      ++counters_.unconfirmed;
+      land(0);
+    }
     ++counters_.confirmed;
-    land(static_cast<std::size_t>(found - begin));
+    land(0);
   }
   last_echo_ = now;
   is_stalled_ = false;

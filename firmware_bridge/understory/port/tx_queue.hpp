@@ -25,7 +25,7 @@ namespace understory::can {
 struct TxCounters {
   std::uint64_t sent = 0;              // frames handed to the port
   std::uint64_t confirmed = 0;         // by their echo
-  std::uint64_t unconfirmed = 0;       // no echo within kEchoTimeout
+  std::uint64_t unconfirmed = 0;       // no echo in time, or a later one's came first
   std::uint64_t unknown_echoes = 0;    // of nothing in flight: late, or altered on the way
   std::uint64_t replaced = 0;          // by newer ones
   std::uint64_t expired = 0;           // waited longer than kDeadline
