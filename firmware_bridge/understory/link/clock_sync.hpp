@@ -2,8 +2,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
 // The vehicle's clock as the host knows it, from PING and PONG: of the last 16 round trips the
-// quickest counts, because it has waited the least. Source: the clock filter of NTP (RFC 5905,
-// section 10). One thread; no allocation; cannot fail.
+// quickest counts, because it has waited the least. A clock that has jumped, as after a restart, is
+// learnt anew. Source: the clock filter of NTP (RFC 5905, section 10). One thread; no allocation;
+// cannot fail.
 #pragma once
 
 #include <array>
@@ -24,7 +25,11 @@ class ClockSync {
       return;
     }
     const Time middle = sent + round_trip / 2;
-    samples_[next_] = {wire_difference(arrived_wire_us, wire_time_us(middle)), round_trip};
+    const Sample sample{wire_difference(arrived_wire_us, wire_time_us(middle)), round_trip};
+    if (is_set() && has_jumped(sample)) {
+      reset();
+    }
+    samples_[next_] = sample;
     next_ = (next_ + 1) % samples_.size();
     count_ = count_ < samples_.size() ? count_ + 1 : count_;
     best_ = 0;
@@ -51,6 +56,13 @@ class ClockSync {
     Duration offset{};  // vehicle's clock less the host's, on the bus's scale
     Duration round_trip{};
   };
+  // Further than what either message can have been under way explains, and some drift.
+  [[nodiscard]] bool has_jumped(const Sample& sample) const {
+    const Sample& best = samples_[best_];
+    const Duration apart = std::chrono::abs(sample.offset - best.offset);
+    return apart > (sample.round_trip + best.round_trip) / 2 + std::chrono::milliseconds(2);
+  }
+
   std::array<Sample, 16> samples_{};
   std::size_t next_ = 0;
   std::size_t count_ = 0;

@@ -128,7 +128,6 @@ void HostStation::on_state(const Frame& frame, Time now) {
       nonce_changes_ = 0;
     }
     ++nonce_changes_;
-    clock_.reset();  // it may have started anew
   }
   last_state_ = now;
   vehicle_ = report;
