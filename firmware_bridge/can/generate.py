@@ -10,12 +10,15 @@ hold the two against each other. Any violation of the protocol's layout rules en
 line.
 """
 
+import math
 import sys
 from pathlib import Path
 
+from corners import corner_frames, physical_value
 from dbc import LayoutError, camel, enums, examples, physical, protocol_hash, read_messages
 from wireshark import write_wireshark
 
+ORACLE_RANDOM_FRAMES = 20  # of each message
 LICENCE = "// Copyright 2026 the Understory authors\n// SPDX-License-Identifier: BSD-3-Clause\n"
 
 # --- C++ -----------------------------------------------------------------------------------------
@@ -155,8 +158,39 @@ def golden_text(message, counter, raws, data):
     return "\n".join(lines)
 
 
+def values_text(message):
+    """A function that gathers what the structure holds, in the order of the DBC."""
+    fields = ", ".join(f"static_cast<double>(message.{s.name})" for s in message.signals)
+    return f"inline std::vector<double> values_of(const {message.name}& message) {{\n  return {{{fields}}};\n}}"
+
+
+def oracle_row(corner):
+    values = [physical_value(*pair) for pair in zip(corner.message.signals, corner.raws)]
+    cells = ", ".join("kNotAvailable" if math.isnan(value) else repr(value) for value in values)
+    legal = "true" if corner.is_legal else "false"
+    return f'    {{"{corner.candump}", {corner.counter}, {legal}, {{{cells}}}}},'
+
+
+def write_oracle(messages, folder):
+    """Codes at all borders and random ones, with what they mean."""
+    corners = list(corner_frames(messages, ORACLE_RANDOM_FRAMES))
+    most = max(len(message.signals) for message in messages)
+    text = [LICENCE + "// Generated from the DBC; do not edit. What frames mean, said in another language."]
+    text += ["#pragma once\n", "#include <array>", "#include <cstdint>", "#include <vector>\n"]
+    text += ['#include "understory/can/messages.hpp"\n', "namespace understory::can {\n"]
+    text += ["struct OracleFrame {\n  const char* candump;\n  std::uint8_t counter;"]
+    text += ["  bool is_legal;  // else it has a code that the protocol forbids"]
+    text += [f"  std::array<double, {most}> values;  // by signal, then zeros\n}};\n"]
+    text += [values_text(message) for message in messages]
+    text += [f"\ninline constexpr std::array<OracleFrame, {len(corners)}> kOracleFrames{{{{"]
+    text += [oracle_row(corner) for corner in corners]
+    text += ["}};\n", "}  // namespace understory::can", ""]
+    (folder / "oracle_frames.hpp").write_text("\n".join(text), encoding="utf-8")
+
+
 def write_golden(messages, folder):
     folder.mkdir(parents=True, exist_ok=True)
+    write_oracle(messages, folder)
     text = [LICENCE + "// Generated from the DBC; do not edit. Frames that were encoded in another language."]
     text += ["#pragma once\n", "#include <cstdint>", "#include <string>", "#include <tuple>\n"]
     text += ['#include "understory/can/messages.hpp"\n', "namespace understory::can {\n"]
