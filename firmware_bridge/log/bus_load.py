@@ -18,6 +18,7 @@ TAIL_BITS = 1 + 1 + 1 + 7 + 3  # CRC delimiter, ACK, its delimiter, EOF, intermi
 SAME_BITS = 5
 CHUNK = 1 << 16
 WINDOW_NS = 100_000_000
+MOST_WINDOWS = 3000  # more than a picture has columns; time may jump by years, too
 
 
 def frame_bits(frames: Frames) -> np.ndarray:
@@ -103,10 +104,14 @@ def peak_load(frames: Frames, bits: np.ndarray, bitrate: int) -> Tuple[float, in
     return float(in_window[at]) / bitrate / (WINDOW_NS / 1e9), int(time_ns[at])
 
 
-def load_over_time(
-    time_ns: np.ndarray, bits: np.ndarray, begin_ns: int, end_ns: int, bitrate: int
-) -> np.ndarray:
-    """Of each 100 ms from begin_ns on."""
-    count = max(int((end_ns - begin_ns) // WINDOW_NS) + 1, 1)
-    sums = np.bincount((time_ns - begin_ns) // WINDOW_NS, weights=bits, minlength=count)
-    return sums[:count] / bitrate / (WINDOW_NS / 1e9)
+def window_of(frames: Frames) -> int:
+    """100 ms, or more when the log is so long that there would be too many."""
+    return max(WINDOW_NS, int(np.ptp(frames.time_ns)) // MOST_WINDOWS)
+
+
+def load_over_time(frames: Frames, bits: np.ndarray, at: np.ndarray, bitrate: int) -> np.ndarray:
+    """Load by the frames at these positions, in each window from the log's begin on."""
+    window_ns, begin_ns = window_of(frames), int(frames.time_ns.min())
+    count = int(np.ptp(frames.time_ns)) // window_ns + 1
+    place = (frames.time_ns[at] - begin_ns) // window_ns
+    return np.bincount(place, weights=bits[at], minlength=count) / bitrate / (window_ns / 1e9)

@@ -30,7 +30,7 @@ REMOTE_DATA = re.compile(rb"[Rr]([0-8]?)")
 FD_DATA = re.compile(rb"#[0-9A-Fa-f]((?:[0-9A-Fa-f]{2}){0,64})")
 ODD_DATA = re.compile(rb"((?:[0-9A-Fa-f]{2}){0,8})(?:_[0-9A-Fa-f])?")  # _: a DLC beyond 8
 
-Progress = Callable[[float], None]  # called with the part that is done, 0 to 1
+Progress = Callable[[str], None]  # called with what is done so far
 
 
 class LogError(Exception):
@@ -57,11 +57,11 @@ class Frames:
         return replace(self, **{name: getattr(self, name)[at] for name in columns})
 
 
-def read_log(path: Path, interface: str = "", progress: Progress = lambda part: None) -> Frames:
+def read_log(path: Path, interface: str = "", progress: Progress = lambda text: None) -> Frames:
     """The frames of one interface; it must be named if there are several."""
     suffix = (path.suffixes[-2:] or [""])[0] if path.suffix == ".gz" else path.suffix
     if suffix.lower() in (".asc", ".blf"):
-        frames = _read_by_library(path)
+        frames = _read_by_library(path, progress)
     else:
         frames = _read_candump(path, progress)
     if not frames.count:
@@ -157,7 +157,8 @@ def _read_candump(path: Path, progress: Progress) -> Frames:
                 tail = rest
                 if newline:
                     line = _add_lines(columns, whole + newline, path, line)
-                progress(file.tell() / size)
+                if file.seekable():  # a pipe does not know how much is to come
+                    progress(f"{100 * file.tell() / size:.0f} % read")
     except OSError as error:
         raise LogError(f"{path}: {error.strerror or error}") from error
     except (EOFError, zlib.error) as error:
@@ -206,12 +207,14 @@ def _bad_line(path: Path, line: int, text: bytes) -> LogError:
 # --- ASC and BLF ---------------------------------------------------------------------------------
 
 
-def _read_by_library(path: Path) -> Frames:
+def _read_by_library(path: Path, progress: Progress) -> Frames:
     import can  # takes a while, and candump's format needs it not
 
     rows, names, notes = [], {}, []
     try:
         for message in can.LogReader(path):
+            if len(rows) % 10_000 == 0:
+                progress(f"{len(rows)} frames read")
             flags = EXTENDED * message.is_extended_id | REMOTE * message.is_remote_frame
             flags |= ERROR * message.is_error_frame | FD * message.is_fd
             name = "can" if message.channel is None else str(message.channel)

@@ -90,7 +90,7 @@ def parse_arguments(words: List[str]) -> argparse.Namespace:
         allow_abbrev=False,
     )
     path = pathlib.Path
-    parser.add_argument("file", type=path, metavar="FILE", nargs="?", help="the log")
+    parser.add_argument("file", type=path, metavar="FILE", nargs="?", help="the log; - is stdin")
     view = parser.add_mutually_exclusive_group()
     for name, what in (
         ("summary", "all of it on a page (default)"),
@@ -245,9 +245,7 @@ def examine(arguments: argparse.Namespace, progress: Progress) -> int:
     from frame_log import read_log
 
     protocol = Protocol(arguments.dbc)
-    frames = read_log(
-        arguments.file, arguments.interface, lambda part: progress(f"{100 * part:.0f} % read")
-    )
+    frames = read_log(arguments.file, arguments.interface, progress)
     log = decode(frames, protocol)
     progress.clear()
     for note in frames.notes:
@@ -286,6 +284,8 @@ def main(words: List[str]) -> int:
     from frame_log import LogError
 
     arguments.dbc = arguments.dbc or DBC
+    if str(arguments.file) == "-":
+        arguments.file = pathlib.Path("/dev/stdin")
 
     progress = Progress()
     try:
@@ -304,5 +304,7 @@ if __name__ == "__main__":
     try:
         sys.exit(main(sys.argv[1:]))
     except KeyboardInterrupt:
+        if sys.stderr.isatty():
+            print(file=sys.stderr)  # not beside a line that shows progress
         # Not sys.exit: what is buffered for stdout is no longer wanted.
         os._exit(130)

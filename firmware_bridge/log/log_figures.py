@@ -168,7 +168,6 @@ def draw_latency(log: Log) -> Figure:
 def draw_load(log: Log, bitrate: int) -> Figure:
     frames = log.frames
     bits = bus_load.frame_bits(frames)
-    begin_ns, end_ns = int(frames.time_ns.min()), int(frames.time_ns.max())
     grouped = {name for names in GROUPS.values() for name in names}
     members = {
         **{group: [log[name].index for name in names] for group, names in GROUPS.items()},
@@ -178,12 +177,11 @@ def draw_load(log: Log, bitrate: int) -> Figure:
     layers = {}
     for group, parts in members.items():
         index = np.concatenate(parts)
-        layers[group] = 100 * bus_load.load_over_time(
-            frames.time_ns[index], bits[index], begin_ns, end_ns, bitrate
-        )
+        layers[group] = 100 * bus_load.load_over_time(frames, bits, index, bitrate)
     layers = {group: values for group, values in layers.items() if values.any()}
     figure, axes = pyplot.subplots(figsize=(9, 3.6), layout="constrained")
-    edges_s = np.arange(len(next(iter(layers.values()), [])) + 1) * bus_load.WINDOW_NS / 1e9
+    window_s = bus_load.window_of(frames) / 1e9
+    edges_s = np.arange(len(next(iter(layers.values()), [])) + 1) * window_s
     below = np.zeros(max(len(edges_s) - 1, 0))
     for group, values in layers.items():
         axes.stairs(below + values, edges_s, baseline=below, fill=True, label=group,
@@ -193,7 +191,7 @@ def draw_load(log: Log, bitrate: int) -> Figure:
     peak, _ = bus_load.peak_load(frames, bits, bitrate)
     shown = "" if mean is None else f": mean {100 * mean:.1f} %, peak {100 * peak:.1f} %"
     axes.set_title(f"Load of the bus at {bitrate / 1e6:g} Mbit/s{shown}")
-    axes.set_ylabel("% of 100 ms")
+    axes.set_ylabel(f"% of {1000 * window_s:.0f} ms")
     axes.set_ylim(0, max(1.25 * float(below.max(initial=0.0)), 1.0))
     axes.legend(loc="upper right", ncols=5)
     return _finish(figure, axes, log)
