@@ -23,6 +23,8 @@ WHOLE_FRAME = {
     "decision": (20.25, 24),
     "trajectory": (20.25, 26),
     "setpoint": (26, 33),
+    "transmit": (26, 29),
+    "acknowledge": (29, 29.5),
 }
 
 

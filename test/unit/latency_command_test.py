@@ -107,7 +107,7 @@ class Command(TraceFolder):
         self.assertEqual(set(written), {"trace.csv", "latency.csv", "latency.png", "trace.json"})
         self.assertEqual(written["latency.png"][:8], b"\x89PNG\r\n\x1a\n")
         self.assertIn(b"\ncloud_wait,2,1.000000,", written["latency.csv"])
-        self.assertEqual(len(json.loads(written["trace.json"])["traceEvents"]), 1 + 2 * 6 + 13)
+        self.assertEqual(len(json.loads(written["trace.json"])["traceEvents"]), 1 + 2 * 8 + 17)
 
     def test_out_is_made_and_the_result_left_alone(self):
         self.trace(frame(0))

@@ -121,7 +121,7 @@ class TraceFile(TraceFolder):
         statistics = statistics_of(self.trace(lines))
 
         self.assertLess(time.process_time() - began, 3.0)
-        self.assertEqual(sum(statistics[stage].count for stage in STAGES), 6 * 16_700)
+        self.assertEqual(sum(statistics[stage].count for stage in STAGES), 8 * 16_700)
 
 
 class Rows(TraceFolder):
@@ -162,6 +162,8 @@ class Rows(TraceFolder):
             "decision": 3.75,
             "trajectory": 5.75,
             "setpoint": 7,
+            "transmit": 3,
+            "acknowledge": 0.5,
             "cloud_wait": 1,
             "map_wait": 0.5,
             "decision_wait": 0.25,
@@ -169,6 +171,8 @@ class Rows(TraceFolder):
             "exposure_to_decision": 24,
             "exposure_to_trajectory": 26,
             "exposure_to_setpoint": 33,
+            "exposure_to_transmit": 29,
+            "exposure_to_acknowledge": 29.5,
             "camera_to_trajectory": 16,
         }
         for name, duration_ms in expected_ms.items():
@@ -238,7 +242,7 @@ class Rows(TraceFolder):
         self.assertEqual(text.split("\n")[0], "stage,count,mean_ms,p50_ms,p90_ms,p99_ms,max_ms")
         self.assertEqual([row["stage"] for row in rows], list(KNOWN_ROWS))
         self.assertEqual(list(rows[2].values())[:4], ["map", "2", "6.500000", "6.500000"])
-        self.assertEqual(set(list(rows[6].values())[2:]), {""})  # no wakeup was marked
+        self.assertEqual(set(list(rows[8].values())[2:]), {""})  # no wakeup was marked
 
 
 class TraceEvents(TraceFolder):

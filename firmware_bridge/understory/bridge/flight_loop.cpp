@@ -159,6 +159,10 @@ void FlightLoop::turn(FlightTick& tick) {
   Mailboxes& boxes = *mailboxes_;
   while (boxes.to_fly.pop(boxes.plan)) {
     ++boxes.plan_count;
+    tick.is_first_with_plan = true;
+  }
+  if (boxes.plan != nullptr) {
+    tick.plan_depth_stamp = boxes.plan->newest()->depth_stamp;
   }
   boxes.taken = boxes.plan_count;
   pass_wish_on();

@@ -52,6 +52,9 @@ struct FlightTick {
   Time depth_stamp{};               // of that trajectory
   bool is_at_rest = true;           // that trajectory has ended
   bool is_first_of_trajectory = false;
+  // The first turn that knew of a new trajectory, whether or not its time had come.
+  bool is_first_with_plan = false;
+  Time plan_depth_stamp{};  // of the newest trajectory known
   bool is_astray = false;  // not where the trajectory is: it holds from then on
   std::uint64_t gate_violations = 0;
   std::uint64_t skipped_deadlines = 0;

@@ -67,7 +67,7 @@ def draw_latency(trace: Trace, budget: Budget) -> Figure:
 def groups_of(names: List[str]) -> List[List[str]]:
     """From top to bottom: the way of a frame with its waits, what belongs to none, end to end."""
     way = [name for stage in PIPELINE for name in (f"{stage}_wait", stage)]
-    way += ["trajectory", "setpoint"]
+    way += ["trajectory", "setpoint", "transmit", "acknowledge"]
     others = [name for name in names if name not in STAGES + WAITS + END_TO_END]
     groups = [way + others, ["wakeup"], list(END_TO_END)]
     present = [[name for name in group if name in names] for group in groups]

@@ -25,6 +25,8 @@ END_TO_END = (
     "exposure_to_decision",
     "exposure_to_trajectory",
     "exposure_to_setpoint",
+    "exposure_to_transmit",
+    "exposure_to_acknowledge",
     "camera_to_trajectory",
 )
 KNOWN_ROWS = STAGES + WAITS + END_TO_END

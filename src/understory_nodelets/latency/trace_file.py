@@ -13,6 +13,8 @@ It is 0 where a row belongs to no frame.
     decision    snapshot received -> decision done, of every frame
     trajectory  begin of its decision -> trajectory published, of those that led to one
     setpoint    trajectory published -> its first setpoint sent
+    transmit    trajectory published -> the first setpoint sent in knowledge of it, on the CAN bus
+    acknowledge that setpoint on the bus -> the vehicle's answer on the bus
     wakeup      thread of the setpoints: deadline -> woken; no frame
 
 Other stages may occur and come after these. Whatever cannot be read raises TraceError with one
@@ -26,7 +28,8 @@ from typing import Dict, List
 
 import numpy as np
 
-STAGES = ("camera", "cloud", "map", "decision", "trajectory", "setpoint", "wakeup")
+STAGES = ("camera", "cloud", "map", "decision", "trajectory", "setpoint")
+STAGES += ("transmit", "acknowledge", "wakeup")
 HEADER = "stage,exposure_ns,begin_ns,end_ns"
 # 18 digits are 31 years and fit 64 bits.
 ROW = re.compile(r"([a-z][a-z0-9_]*),(\d{1,18}),(\d{1,18}),(\d{1,18})", re.ASCII)

@@ -130,7 +130,7 @@ class BridgeNodelet : public GuardedNodelet {
     }
   }
 
-  // The way of a trajectory's first setpoint over the bus.
+  // The way over the bus of the first setpoint that was sent in knowledge of a trajectory.
   void trace_bus(const FlightTick& tick) {
     const LinkStatus& link = tick.telemetry.link;
     if (is_answer_awaited_ && link.acked_set == awaited_set_) {
@@ -140,7 +140,7 @@ class BridgeNodelet : public GuardedNodelet {
       const auto to_steady_ns = [&](Time time) {
         return (time.time_since_epoch().count() + offset_us) * 1000;
       };
-      trace("transmit", awaited_exposure_, awaited_sent_ns_, to_steady_ns(link.acked_sent));
+      trace("transmit", awaited_exposure_, awaited_since_ns_, to_steady_ns(link.acked_sent));
       trace("acknowledge",
             awaited_exposure_,
             to_steady_ns(link.acked_sent),
@@ -148,10 +148,12 @@ class BridgeNodelet : public GuardedNodelet {
     }
     if (tick.is_first_of_trajectory && tick.depth_stamp != Time{}) {
       trace("setpoint", to_ros(tick.depth_stamp), published_ns_, tick.sent_ns);
+    }
+    if (tick.is_first_with_plan && tick.plan_depth_stamp != Time{}) {
       is_answer_awaited_ = true;
       awaited_set_ = link.sets_sent;
-      awaited_exposure_ = to_ros(tick.depth_stamp);
-      awaited_sent_ns_ = tick.sent_ns;
+      awaited_exposure_ = to_ros(tick.plan_depth_stamp);
+      awaited_since_ns_ = published_ns_;
     }
   }
 
@@ -259,7 +261,7 @@ class BridgeNodelet : public GuardedNodelet {
   bool is_answer_awaited_ = false;
   std::uint64_t awaited_set_ = 0;
   ros::Time awaited_exposure_;
-  std::int64_t awaited_sent_ns_ = 0;
+  std::int64_t awaited_since_ns_ = 0;
   ros::Time last_status_;
   ros::Time last_timing_;
   ros::Time last_path_;
