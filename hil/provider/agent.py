@@ -6,11 +6,11 @@ usage: agent.py CHANNEL [REASON]   (REASON: why there is no bus; it is passed on
 """
 
 import ctypes
-import errno
 import fcntl
 import json
 import os
 import select
+import shutil
 import signal
 import struct
 import sys
@@ -20,12 +20,12 @@ import tty
 from typing import Any, Dict, List, Optional
 
 import frames
+from execute import execute, fail
 
 OUTPUT_PENDING = 65536  # more than this is not taken from the command until the host took it
 TERM_PATIENCE_S = 2.0  # for what the command left running
 KILL_PATIENCE_S = 1.0
 POWER_OFF = 0x4321FEDC
-SIGNALS = (signal.SIGCHLD,)
 
 
 def power_off() -> None:
@@ -81,24 +81,19 @@ class Command:
         return theirs
 
     def _become(self, spec: Dict[str, Any], theirs: List[int]) -> None:
+        os.setsid()
+        if self.on_whole_terminal:
+            fcntl.ioctl(theirs[0], termios.TIOCSCTTY, 0)
+        for number, end in enumerate(theirs):
+            os.dup2(end, number)
+        signal.set_wakeup_fd(-1)
+        signal.signal(signal.SIGCHLD, signal.SIG_DFL)
+        os.umask(spec["umask"])
         try:
-            os.setsid()
-            if spec["whole_terminal"]:
-                fcntl.ioctl(theirs[0], termios.TIOCSCTTY, 0)
-            for number, end in enumerate(theirs):
-                os.dup2(end, number)
-            signal.set_wakeup_fd(-1)
-            for number in (*SIGNALS, signal.SIGPIPE, signal.SIGXFSZ):
-                signal.signal(number, signal.SIG_DFL)
-            os.umask(spec["umask"])
-            environment = {os.fsencode(k): os.fsencode(v) for k, v in spec["environment"].items()}
             os.chdir(spec["folder"])
-            os.execvpe(spec["command"][0], spec["command"], environment)
         except OSError as error:
-            name = spec["command"][0] if error.filename is None else error.filename
-            text = f"understory hil: {os.fsdecode(name)}: {os.strerror(error.errno)}\n"
-            os.write(2, os.fsencode(text))
-            os._exit(127 if error.errno in (errno.ENOENT, errno.ENOTDIR) else 126)
+            fail(spec["folder"], error)
+        execute(spec["command"], spec["environment"])
 
     def close_output(self, kind: bytes) -> None:
         """So that the command notices, as it would with `| head` on the host."""
@@ -131,8 +126,7 @@ class Agent:
         for end in (self._wake, wake_write):
             os.set_blocking(end, False)
         signal.set_wakeup_fd(wake_write, warn_on_full_buffer=False)
-        for number in SIGNALS:
-            signal.signal(number, lambda *_: None)
+        signal.signal(signal.SIGCHLD, lambda *_: None)
 
     def run(self) -> None:
         self._send(frames.encode(frames.READY))
@@ -195,14 +189,20 @@ class Agent:
             return
         except OSError:
             data = b""
-        if not data:  # the provider is gone: nobody wants the command any more
-            self._host_is_there = False
-            self._to_host.clear()
-            self._signal_command(signal.SIGTERM)
-            self._ending_since = self._ending_since or time.monotonic()
+        if not data:
+            self._leave_host()
             return
+        self._send(frames.encode_number(frames.RECEIVED, len(data)))
         for kind, payload in self._decoder.feed(data):
             self._on_frame(kind, payload)
+
+    def _leave_host(self) -> None:
+        """The provider was killed: nobody wants the command any more, nobody else tidies up."""
+        self._host_is_there = False
+        self._to_host.clear()
+        self._signal_command(signal.SIGTERM)
+        self._ending_since = self._ending_since or time.monotonic()
+        shutil.rmtree(os.environ["HIL_FOLDER"], ignore_errors=True)
 
     def _on_frame(self, kind: bytes, payload: bytes) -> None:
         if kind == frames.START:
@@ -236,8 +236,7 @@ class Agent:
         except BlockingIOError:
             return
         except OSError:
-            self._host_is_there = False
-            self._to_host.clear()
+            self._leave_host()
             return
         del self._to_host[:written]
 
@@ -310,6 +309,8 @@ def main(arguments: List[str]) -> None:
 
 
 if __name__ == "__main__":
+    if os.getpid() != 1:  # it ends all other processes of its machine
+        sys.exit("agent.py is for the first process of a booted kernel")
     try:
         main(sys.argv[1:])
     finally:

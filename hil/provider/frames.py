@@ -12,12 +12,15 @@ from typing import List, Tuple
 READY, START, EXIT, FAILED = b"R", b"S", b"X", b"F"
 INPUT, TAKEN = b"0", b"T"  # INPUT without payload: end of input; TAKEN: bytes the command took
 OUTPUT, ERRORS = b"1", b"2"
+RECEIVED = b"A"  # bytes that the agent read from the line
 SIGNAL, SIZE = b"K", b"W"
 CLOSED = b"C"  # nobody reads this output (its kind is the payload) any more
 
 CHUNK = 16384
 # So much input may be under way: a command that reads nothing must not hold up a signal.
 INPUT_WINDOW = 65536
+# User-Mode Linux never wakes up a serial line again once its buffer of 4096 bytes was full.
+LINE_WINDOW = 2048
 
 _HEADER = struct.Struct(">cI")
 _NUMBER = struct.Struct(">i")

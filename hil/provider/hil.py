@@ -13,10 +13,11 @@ import sys
 from typing import List, Optional, Sequence, Tuple
 
 from job import FAILED_STATUS, WIRE_BITRATE, HilError, Job
+from native import Native
 from relay import Interrupted, is_terminal
 from uml import Uml
 
-PROVIDERS = {"uml": Uml()}
+PROVIDERS = {"native": Native(), "uml": Uml()}
 WRONG_USE = 2
 
 
@@ -36,6 +37,9 @@ def make_parser() -> argparse.ArgumentParser:
     parser.add_argument("--list", action="store_true", help="which providers work here, and why")
     parser.add_argument(
         "--provider", choices=["auto", *PROVIDERS], default="auto", help="default: the first that works"
+    )
+    parser.add_argument(
+        "--interface", metavar="NAME", help="use this CAN interface of the host, as it is"
     )
     parser.add_argument("--interfaces", type=int, default=1, metavar="N", help="vcan0 to vcanN-1")
     parser.add_argument(
@@ -77,6 +81,7 @@ def parse(words: Sequence[str]) -> Tuple[argparse.Namespace, Job]:
     return options, Job(
         command=command or [],
         interfaces=options.interfaces,
+        existing_interface=options.interface,
         is_echo=options.echo or options.wire,
         bitrate=WIRE_BITRATE if options.wire else None,
         memory_mib=options.memory,
@@ -94,6 +99,8 @@ def list_providers(job: Job) -> int:
 
 
 def choose(name: str, job: Job):
+    if name == "auto" and job.existing_interface is not None:
+        name = Native.name
     wanted = list(PROVIDERS) if name == "auto" else [name]
     reasons = []
     for candidate in wanted:
@@ -101,7 +108,7 @@ def choose(name: str, job: Job):
         if reason is None:
             return PROVIDERS[candidate]
         reasons.append(f"{candidate}: {reason}")
-    raise HilError("no CAN bus on this machine. " + "; ".join(reasons))
+    raise HilError(("no provider works here. " if name == "auto" else "") + "; ".join(reasons))
 
 
 def exit_status(wait_status: int) -> int:

@@ -3,7 +3,8 @@
 """What a provider is asked to run, and what can go wrong before the command runs."""
 
 import dataclasses
-from typing import List, Optional
+import os
+from typing import Dict, List, Optional
 
 WIRE_BITRATE = 1_000_000
 WIRE_QUEUE = 10  # frames, as the queue of a real CAN interface
@@ -26,3 +27,12 @@ class Job:
     queue: int = WIRE_QUEUE
     memory_mib: int = 2048
     is_shell: bool = False
+
+
+def environment_for(job: Job, provider: str) -> Dict[str, str]:
+    """The caller's, with the name of the bus for programs and tests."""
+    return {
+        **os.environ,
+        "UNDERSTORY_CAN": job.existing_interface or "vcan0",
+        "UNDERSTORY_HIL_PROVIDER": provider,
+    }

@@ -42,9 +42,9 @@ class KernelRun(contextlib.AbstractContextManager):  # type: ignore[type-arg]
     def __init__(self, name: str) -> None:
         self._name = name
         self._kernel: Optional["subprocess.Popen[bytes]"] = None
-        parent = tempfile.gettempdir()
         # The kernel's command line has no way to write a space.
-        self.folder = Path(tempfile.mkdtemp(prefix="understory-hil-", dir=parent if " " not in parent else "/tmp"))
+        parent = "/tmp" if " " in tempfile.gettempdir() else None
+        self.folder = Path(tempfile.mkdtemp(prefix="understory-hil-", dir=parent))
         # Whatever the path of the project is, this one is short and plain.
         (self.folder / "provider").symlink_to(HERE)
 
@@ -52,6 +52,7 @@ class KernelRun(contextlib.AbstractContextManager):  # type: ignore[type-arg]
     def boot_arguments(job: Job, folder: Path, channel: str, modules: Path) -> List[str]:
         settings = {
             "HIL_CHANNEL": channel,
+            "HIL_FOLDER": folder,
             "HIL_MODULES": modules,
             "HIL_INTERFACES": job.interfaces,
             "HIL_ECHO": int(job.is_echo),
@@ -62,7 +63,7 @@ class KernelRun(contextlib.AbstractContextManager):  # type: ignore[type-arg]
 
     def start(
         self, command: List[str], environment: Dict[str, str], kept_files: Tuple[int, ...]
-    ) -> "subprocess.Popen[bytes]":
+    ) -> None:
         """In a session of its own: a Ctrl-C of the terminal is for the command inside."""
         with open(self._log(), "wb") as log:
             self._kernel = subprocess.Popen(
@@ -75,13 +76,15 @@ class KernelRun(contextlib.AbstractContextManager):  # type: ignore[type-arg]
                 stderr=log,
                 start_new_session=True,
             )
-        return self._kernel
 
     def relay(self, channel: socket.socket, job: Job) -> int:
         try:
-            return Relay(channel, job).run(self._name)
+            return Relay(channel, job, self._lives).run(self._name)
         except HilError as error:
             raise HilError(f"{error} (its log: {self._kept_log()})") from None
+
+    def _lives(self) -> bool:
+        return self._kernel is not None and self._kernel.poll() is None
 
     def _log(self) -> Path:
         return self.folder / "kernel.log"

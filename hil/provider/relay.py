@@ -14,15 +14,15 @@ import struct
 import termios
 import time
 import tty
-from typing import Iterator, List, Optional
+from typing import Callable, Iterator, List, Optional
 
 import frames
-from job import HilError, Job
+from job import HilError, Job, environment_for
 
 BOOT_PATIENCE_S = 60.0
 QUIET_BOOT_S = 2.0
 KILL_PATIENCE_S = 3.0
-ENDED_EARLY = "the kernel ended before the command did"
+ENDED_EARLY = "the booted kernel ended before the command did"
 PASSED_ON = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
 PASSED_ON += (signal.SIGUSR1, signal.SIGUSR2)
 ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
@@ -45,15 +45,12 @@ def terminal_size() -> Optional[List[int]]:
 
 
 def start_frame(job: Job, provider: str) -> bytes:
-    environment = dict(os.environ)
-    environment["UNDERSTORY_CAN"] = job.existing_interface or "vcan0"
-    environment["UNDERSTORY_HIL_PROVIDER"] = provider
     terminals = [is_terminal(number) for number in (0, 1, 2)]
     umask = os.umask(0)
     os.umask(umask)
     spec = {
         "command": job.command,
-        "environment": environment,
+        "environment": environment_for(job, provider),
         "folder": os.getcwd(),
         "umask": umask,
         "terminal": [False, *terminals[1:]],  # lines typed come through a pipe, its end included
@@ -73,12 +70,13 @@ class Interrupted(Exception):
 class Relay:
     """Serves one command from the boot of its kernel to its exit status."""
 
-    def __init__(self, channel: socket.socket, job: Job) -> None:
+    def __init__(self, channel: socket.socket, job: Job, kernel_lives: Callable[[], bool]) -> None:
         channel.setblocking(False)
-        self._channel, self._job = channel, job
+        self._channel, self._job, self._kernel_lives = channel, job, kernel_lives
         self._decoder = frames.Decoder()
         self._to_agent = bytearray()
         self._outputs = {1: bytearray(), 2: bytearray()}
+        self._line_window = frames.LINE_WINDOW
         self._input_window = frames.INPUT_WINDOW
         self._input_open = True
         self._is_ready = False
@@ -143,7 +141,8 @@ class Relay:
         if self._is_ready and self._input_open and self._input_window > 0 and self._status is None:
             reading.append(0)
         writing: List[int] = [number for number, pending in self._outputs.items() if pending]
-        if self._to_agent and self._is_ready and self._status is None:
+        may_send = self._is_ready and self._status is None and self._line_window > 0
+        if self._to_agent and may_send:
             writing.append(self._channel.fileno())
         try:
             readable, writable, _ = select.select(reading, writing, [], 0.25)
@@ -191,11 +190,13 @@ class Relay:
 
     def _write_channel(self) -> None:
         try:
-            del self._to_agent[: self._channel.send(self._to_agent[:4096])]
+            sent = self._channel.send(self._to_agent[: self._line_window])
         except BlockingIOError:
-            pass
+            return
         except OSError:
             raise HilError(ENDED_EARLY) from None
+        del self._to_agent[:sent]
+        self._line_window -= sent
 
     def _read_channel(self) -> None:
         try:
@@ -211,6 +212,8 @@ class Relay:
                 self._outputs[1] += payload
             elif kind == frames.ERRORS:
                 self._outputs[2] += payload
+            elif kind == frames.RECEIVED:
+                self._line_window += frames.number_of(payload)
             elif kind == frames.TAKEN:
                 self._input_window += frames.number_of(payload)
             elif kind == frames.EXIT:
@@ -243,6 +246,9 @@ class Relay:
             self._send(frames.encode_number(frames.SIGNAL, number))
 
     def _watch_time(self) -> None:
+        # The channel does not tell: what the kernel leaves behind when killed has it open too.
+        if self._status is None and not self._kernel_lives():
+            raise HilError(ENDED_EARLY)
         waited_s = time.monotonic() - self._began
         if not self._is_ready:
             if waited_s > BOOT_PATIENCE_S:

@@ -3,9 +3,7 @@
 """The provider that boots User-Mode Linux: a kernel as a process, with the host's files as root."""
 
 import os
-import shutil
 import socket
-import subprocess
 from pathlib import Path
 from typing import Dict, List, Optional
 
@@ -41,6 +39,8 @@ class Uml:
         """Why it cannot work here."""
         if job.existing_interface is not None:
             return "--interface needs the host's own kernel"
+        if "UNDERSTORY_HIL_PROVIDER" in os.environ:
+            return "not within another provider"
         if not os.access(KERNEL, os.X_OK) or not MODULES.is_dir():
             return f"{KERNEL} is not there (package user-mode-linux)"
         lacking = inside_needs()
