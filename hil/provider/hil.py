@@ -65,7 +65,9 @@ def split_arguments(words: Sequence[str]) -> Tuple[List[str], Optional[List[str]
 def parse(words: Sequence[str]) -> Tuple[argparse.Namespace, Job]:
     ours, command = split_arguments(words)
     parser = make_parser()
-    options = parser.parse_args(ours)
+    options, strange = parser.parse_known_args(ours)
+    if strange and (strange[0].startswith("-") or command is not None):
+        parser.error(f"unknown option {strange[0]}")
     if options.shell:
         if command is not None:
             parser.error("--shell takes no command")
@@ -74,6 +76,8 @@ def parse(words: Sequence[str]) -> Tuple[argparse.Namespace, Job]:
         command = [os.environ.get("SHELL") or "/bin/bash"]
     elif not command and not options.list:
         parser.error("name a command after --, or use --shell")
+    if strange:
+        parser.error("the command must follow --")
     if not 1 <= options.interfaces <= 16:
         parser.error("--interfaces must be 1 to 16")
     if not 256 <= options.memory <= 1 << 20:
