@@ -10,19 +10,36 @@ started), 2 for wrong use, 125 if there is no bus.
 import argparse
 import os
 import sys
-from typing import List, Optional, Sequence, Tuple
+from typing import Dict, List, NoReturn, Optional, Protocol, Sequence, Tuple
 
 from job import FAILED_STATUS, WIRE_BITRATE, HilError, Job
 from native import Native
 from relay import Interrupted, is_terminal
 from uml import Uml
 
-PROVIDERS = {"native": Native(), "uml": Uml()}
 WRONG_USE = 2
 
 
+class Provider(Protocol):
+    def missing(self, job: Job) -> Optional[str]:
+        """Why it cannot work here; None if it can."""
+
+    def run(self, job: Job) -> int:
+        """The wait status of the command."""
+
+
+# In the order in which they are tried: the quickest first.
+PROVIDERS: Dict[str, Provider] = {"native": Native(), "uml": Uml()}
+
+
+class Parser(argparse.ArgumentParser):
+    def error(self, message: str) -> NoReturn:
+        """One line, as all commands of the project do."""
+        self.exit(WRONG_USE, f"understory hil: {message} (see understory hil --help)\n")
+
+
 def make_parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
+    parser = Parser(
         prog="understory hil",
         usage="understory hil [OPTION]... -- COMMAND [ARG]...\n"
         "       understory hil [OPTION]... --shell\n"
@@ -66,7 +83,7 @@ def parse(words: Sequence[str]) -> Tuple[argparse.Namespace, Job]:
     ours, command = split_arguments(words)
     parser = make_parser()
     options, strange = parser.parse_known_args(ours)
-    if strange and (strange[0].startswith("-") or command is not None):
+    if strange and strange[0].startswith("-"):
         parser.error(f"unknown option {strange[0]}")
     if options.shell:
         if command is not None:
@@ -102,7 +119,7 @@ def list_providers(job: Job) -> int:
     return 0 if works else FAILED_STATUS
 
 
-def choose(name: str, job: Job):
+def choose(name: str, job: Job) -> Provider:
     if name == "auto" and job.existing_interface is not None:
         name = Native.name
     wanted = list(PROVIDERS) if name == "auto" else [name]

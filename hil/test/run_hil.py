@@ -34,6 +34,10 @@ def hil_options(path: Path) -> List[str]:
     return []
 
 
+def test_modules() -> List[Path]:
+    return sorted(path for path in HERE.glob("*_hil.py") if path != Path(__file__).resolve())
+
+
 class TooLong(Exception):
     pass
 
@@ -65,7 +69,8 @@ class Outcome(unittest.TestResult):
     def _keep(self, name: str, duration_s: float) -> None:
         self.cases.append((name, duration_s, self._kind, self._text))
         verdict = {"": "ok", "failure": "FAILED", "skipped": "skipped"}[self._kind]
-        print(f"[{len(self.cases)}/{self._total}] {name} {verdict} {duration_s:.1f} s", flush=True)
+        number = f"{len(self.cases)} of {self._total}"
+        print(f"{number}: {name} {verdict} {duration_s:.1f} s", flush=True)
         if self._text:
             print(self._text, flush=True)
 
@@ -134,7 +139,7 @@ def main() -> int:
     options = parser.parse_args()
     faulthandler.enable()
     signal.signal(signal.SIGALRM, _on_alarm)
-    suite = load(options.modules or sorted(HERE.glob("*_hil.py")), options.pattern)
+    suite = load(options.modules or test_modules(), options.pattern)
     outcome = Outcome(suite.countTestCases())
     suite.run(outcome)
     if options.out is not None:

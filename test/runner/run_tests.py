@@ -16,6 +16,7 @@ import traceback
 import builds
 from catkin_check import built_workspace, check_catkin
 from commands import ROOT, cpp_files, output_of, say
+from hil_tests import run_hil_tests
 from python_tests import run_python_tests
 from results import SuiteResult, check_minimums, read_minimums, summary, totals
 from ros_tests import run_ros_tests
@@ -24,6 +25,7 @@ from static_checks import check_format, check_shell
 from tidy import check_tidy
 
 QUICK_SUITES = ["format", "shell", "unit", "python"]
+HIL_SUITES = ["build", "hil"]
 LEAKS_OF_LIBRARIES = pathlib.Path(__file__).parent / "lsan_suppressions.txt"
 SANITIZER_ENV = {
     "ASAN_OPTIONS": "strict_string_checks=1:detect_stack_use_after_return=1",
@@ -32,14 +34,21 @@ SANITIZER_ENV = {
 }
 
 
-def run_build_and_ctest(quick):
-    """(build folder or None, results)."""
+def run_build(quick):
+    """(build folder or None, result)."""
     say("\n== build: optimised, with assertions, warnings are errors")
     began = time.monotonic()
     folder = builds.build("build-test", builds.CHECKED, ["test_unit"] if quick else ["all"])
     built = SuiteResult("build", passed=1, duration_s=time.monotonic() - began)
     if folder is None:
         built.passed, built.failed = 0, ["build-test does not compile"]
+    return folder, built
+
+
+def run_build_and_ctest(quick):
+    """(build folder or None, results)."""
+    folder, built = run_build(quick)
+    if folder is None:
         return None, [built]
     say("\n== ctest: " + ("unit tests" if quick else "unit, thread, bad input, property, scenario tests"))
     return folder, [built] + guarded("ctest", builds.run_ctest, folder, "^unit$" if quick else "")
@@ -154,6 +163,11 @@ def run_tidy_and_ros(folder):
         return tidy.result() + ros
 
 
+def run_hil_alone():
+    folder, built = run_build(False)
+    return [built] + (guarded("hil", run_hil_tests, folder) if folder is not None else [])
+
+
 def run_all(quick):
     results = guarded("format", check_format) + guarded("shell", check_shell)
     folder, built = run_build_and_ctest(quick)
@@ -164,6 +178,7 @@ def run_all(quick):
     if folder is not None:
         results += guarded("parameters", check_parameters, folder)
         results += run_tidy_and_ros(folder)
+    results += guarded("hil", run_hil_tests, folder)
     results += guarded("unit-asan", run_sanitized)
     results += guarded("threads-tsan", run_thread_sanitized)
     results += guarded("catkin", check_catkin)
@@ -172,12 +187,19 @@ def run_all(quick):
 
 def main():
     parser = argparse.ArgumentParser(prog="understory test")
-    parser.add_argument("--quick", action="store_true")
-    quick = parser.parse_args().quick
+    choice = parser.add_mutually_exclusive_group()
+    choice.add_argument("--quick", action="store_true")
+    choice.add_argument("--hil", action="store_true")
+    options = parser.parse_args()
     began = time.monotonic()
-    results = run_all(quick)
     minimums = read_minimums(ROOT / "test" / "expected_counts.txt")
-    check_minimums(results, minimums, QUICK_SUITES if quick else sorted(minimums))
+    required = sorted(minimums)
+    if options.hil:
+        results, required = run_hil_alone(), HIL_SUITES
+    else:
+        results = run_all(options.quick)
+        required = QUICK_SUITES if options.quick else required
+    check_minimums(results, minimums, required)
     say(f"\n== summary ({(time.monotonic() - began) / 60:.1f} minutes)")
     say(summary(results))
     return 1 if totals(results)[1] else 0

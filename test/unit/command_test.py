@@ -11,7 +11,8 @@ import unittest
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 COMMAND = ROOT / "understory"
-SUBCOMMANDS = ["setup", "build", "simulate", "fly", "latency", "log", "bench", "test"]
+SUBCOMMANDS = ["setup", "build", "simulate", "fly", "latency", "log", "bench", "hil"]
+SUBCOMMANDS += ["test"]
 
 
 def run(*arguments, command=COMMAND, cwd="/"):

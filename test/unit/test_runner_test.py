@@ -13,6 +13,7 @@ import xml.etree.ElementTree
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "runner"))
 
 import builds  # noqa: E402
+import hil_tests  # noqa: E402
 import results  # noqa: E402
 import ros_tests  # noqa: E402
 import tidy  # noqa: E402
@@ -100,6 +101,31 @@ class RosCountTest(unittest.TestCase):
 
             self.assertEqual(ros_tests.count_results(pathlib.Path(folder), "topics", result), 0)
             self.assertEqual(result.failed, ["topics: rostest.testtopics"])
+
+
+class HilTest(unittest.TestCase):
+    def found_without_a_bus(self, environment):
+        with unittest.mock.patch.object(hil_tests, "why_no_bus", return_value="no bus"):
+            with unittest.mock.patch.dict(hil_tests.os.environ, environment, clear=True):
+                found = [hil_tests.run_hil_tests()]
+        results.check_minimums(found, {"hil": 10}, ["hil"])
+        return found
+
+    def test_without_a_bus_the_suite_is_one_skipped_test(self):
+        found = self.found_without_a_bus({})
+
+        self.assertEqual(results.totals(found), (0, 0, 1))
+        self.assertEqual(found[0].skipped, [("hil", "no bus")])
+
+    def test_without_a_bus_the_suite_fails_in_continuous_integration(self):
+        self.assertGreater(results.totals(self.found_without_a_bus({"CI": "true"}))[1], 0)
+
+    def test_every_module_gets_the_bus_it_wants(self):
+        found = hil_tests.jobs(pathlib.Path("/results"), None)
+
+        self.assertIn("--wire", found["wire_hil"])
+        self.assertNotIn("--wire", found["provider_hil"])
+        self.assertNotIn("run_hil", found)
 
 
 class TidyEntriesTest(unittest.TestCase):

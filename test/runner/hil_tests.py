@@ -1,0 +1,122 @@
+# Copyright 2026 the Understory authors
+# SPDX-License-Identifier: BSD-3-Clause
+"""The HIL suite: every hil/test/*_hil.py and the port's GoogleTest program with a bus of their own
+each, and the bus provider from outside. Two at a time: a booted kernel has one processor."""
+
+import concurrent.futures
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+import xml.etree.ElementTree
+from pathlib import Path
+
+from commands import ROOT, run_logged, say, show_log
+from results import SuiteResult
+from ros_tests import count_file
+
+FOLDER = ROOT / "hil" / "test"
+RESULTS = ROOT / "build-test" / "hil"
+RUNNER = FOLDER / "run_hil.py"
+FROM_HOST = FOLDER / "from_host.py"
+PORT_TEST = "hil_port_test"
+AT_ONCE = 2
+# Tests have time limits of their own; this is for what hangs as a whole. The first signal lets
+# the command end, the second one ends the kernel.
+TIMEOUT_S, SECOND_SIGNAL_S, KILL_S = 420, 15, 15
+
+sys.path.insert(0, str(FOLDER))
+from run_hil import hil_options, test_modules  # noqa: E402  pylint: disable=wrong-import-position
+
+
+def with_timeout(command):
+    outer = ["timeout", f"--kill-after={KILL_S}", str(TIMEOUT_S + SECOND_SIGNAL_S)]
+    return [*outer, "timeout", str(TIMEOUT_S), *command]
+
+
+def with_bus(options, command):
+    return with_timeout([ROOT / "understory", "hil", *options, "--", *command])
+
+
+def why_no_bus():
+    """None if some provider works here."""
+    outcome = subprocess.run(
+        [ROOT / "understory", "hil", "--list"],
+        stdin=subprocess.DEVNULL,
+        capture_output=True,
+        encoding="utf-8",
+        check=False,
+    )
+    reason = "; ".join(" ".join(line.split()) for line in outcome.stdout.splitlines())
+    return None if outcome.returncode == 0 else f"no bus here: {reason or outcome.stderr}"
+
+
+def jobs(folder, build_folder):
+    """{name: command}; each writes its JUnit report to folder/NAME/NAME.xml."""
+    report = folder / FROM_HOST.stem / f"{FROM_HOST.stem}.xml"
+    from_host = [sys.executable, "-B", RUNNER, "--out", report, FROM_HOST]
+    found = {FROM_HOST.stem: with_timeout(from_host)}  # first, since it takes longest
+    for path in test_modules():
+        report = ["--out", folder / path.stem / f"{path.stem}.xml"]
+        found[path.stem] = with_bus(hil_options(path), [RUNNER, *report, path])
+    for program in sorted(build_folder.rglob(PORT_TEST)) if build_folder is not None else []:
+        report = folder / PORT_TEST / f"{PORT_TEST}.xml"
+        if program.is_file() and os.access(program, os.X_OK):
+            found[PORT_TEST] = with_bus([], [program, f"--gtest_output=xml:{report}"])
+    return found
+
+
+def run_job(name, command, folder):
+    """The results of one boot."""
+    began = time.monotonic()
+    result = SuiteResult(name)
+    environment = {"UNDERSTORY_BUILD": str(ROOT / "build-test"), "PYTHONDONTWRITEBYTECODE": "1"}
+    status = run_logged(command, folder / name / "test.log", env=environment)
+    report = folder / name / f"{name}.xml"
+    if report.exists():
+        count_file(xml.etree.ElementTree.parse(report).getroot(), name, result)
+    if not report.exists() or result.ran + len(result.skipped) == 0:
+        result.failed.append(f"{name} produced no results (status {status})")
+    elif status != 0 and not result.failed:
+        result.failed.append(f"{name} ended with status {status}")
+    result.duration_s = time.monotonic() - began
+    return result
+
+
+def show_job(name, found, folder):
+    count = found.ran + len(found.skipped)
+    say(f"  {name}: {count} tests, {found.duration_s:.0f} s")
+    if found.failed:
+        show_log(folder / name / "test.log")
+
+
+def run_hil_tests(build_folder=None):
+    """One SuiteResult; `build_folder`: where the port's test program was built, if it was."""
+    say("\n== hil: the bus, with a kernel that has CAN")
+    began = time.monotonic()
+    result = SuiteResult("hil")
+    reason = why_no_bus()
+    if reason is not None:
+        result.is_absent = not os.environ.get("CI")
+        if result.is_absent:
+            result.skipped.append(("hil", reason))
+        else:
+            result.failed.append(reason)
+        return result
+    RESULTS.mkdir(parents=True, exist_ok=True)
+    folder = Path(tempfile.mkdtemp(prefix="run_", dir=RESULTS))
+    with concurrent.futures.ThreadPoolExecutor(AT_ONCE) as pool:
+        todo = jobs(folder, build_folder).items()
+        runs = {pool.submit(run_job, name, command, folder): name for name, command in todo}
+        for run in concurrent.futures.as_completed(runs):
+            found = run.result()
+            show_job(runs[run], found, folder)
+            result.passed += found.passed
+            result.failed += found.failed
+            result.skipped += found.skipped
+    if not result.failed:
+        shutil.rmtree(folder)
+    result.duration_s = time.monotonic() - began
+    return result
