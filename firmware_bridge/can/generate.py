@@ -222,7 +222,7 @@ def signal_row(signal, raw):
     )
 
 
-def docs_text(messages):
+def docs_text(version, messages):
     text = [
         "# The CAN protocol\n",
         "Generated from `firmware_bridge/can/understory.dbc` by `firmware_bridge/can/generate.py docs`.\n",
@@ -230,6 +230,7 @@ def docs_text(messages):
         "0x2F, initial and final XOR 0xFF) over bytes 1 to 7 and then the message's data identifier; the low",
         "half of byte 1 counts 0 to 15 (AUTOSAR E2E profile 2). The code that means \"not available\" is",
         "all ones (unsigned) or the most negative one (signed). The example of each message is a test.\n",
+        f"Version {version}, hash 0x{protocol_hash(messages):04X} (of HOST_HB and VEH_HB).\n",
     ]
     for message, counter, raws, data in examples(messages):
         period = f"every {message.period_ms} ms at most" if message.period_ms else "on event"
@@ -255,7 +256,7 @@ def main(words):
     try:
         version, messages = read_messages(Path(words[1]))
         if words[0] == "docs":
-            print(docs_text(messages))
+            print(docs_text(version, messages))
         elif words[0] == "cpp":
             write_cpp(version, messages, Path(words[2]))
         elif words[0] == "golden":

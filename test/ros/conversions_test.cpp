@@ -163,7 +163,7 @@ TEST(MissionStatusMessage, WithUnknownEnumeratorsIsRefused) {
   msg.state = 8;
   EXPECT_FALSE(from_msg(msg));
   msg = good;
-  msg.stop_reason = 9;
+  msg.stop_reason = understory_msgs::MissionStatus::TRACKING_LOST + 1;
   EXPECT_FALSE(from_msg(msg));
   msg = good;
   msg.mode = 4;

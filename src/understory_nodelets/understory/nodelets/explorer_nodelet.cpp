@@ -54,7 +54,7 @@ class ExplorerNodelet : public GuardedNodelet {
         [this, command](std_srvs::Trigger::Request&, std_srvs::Trigger::Response& response) {
           guarded([&] { response.success = static_cast<std::uint8_t>(obey(command)); });
           response.message = mission_ ? to_string(mission_->state()) : "no map yet";
-          if (command == Command::START && response.success == 0 && flight_.armed == 0) {
+          if (command == Command::START && response.success == 0 && !is_armed()) {
             response.message = "not armed: " + flight_.vehicle_state + " " + flight_.vehicle_reason;
           }
           return true;
@@ -92,8 +92,6 @@ class ExplorerNodelet : public GuardedNodelet {
         fail(StopReason::kStageFailed, "the bridge's gate refused a setpoint");
       } else if (flight->astray != 0) {
         fail(StopReason::kTrackingLost, "the vehicle is not where its trajectory is");
-      } else if (mission_->state() == MissionState::kWaiting) {
-        start_when_armed();
       } else if (flight->battery_low != 0 && mission_->stop_reason() == StopReason::kNone) {
         NODELET_WARN("%s: the battery is low: back home", getName().c_str());
         static_cast<void>(obey(Command::RETURN_HOME));
@@ -101,8 +99,13 @@ class ExplorerNodelet : public GuardedNodelet {
     });
   }
 
+  // Another autopilot than the bridge's may have no such word; then it flies what it gets.
+  [[nodiscard]] bool is_armed() const {
+    return flight_.armed != 0 || flight_subscriber_.getNumPublishers() == 0;
+  }
+
   void start_when_armed() {
-    if (flight_.armed != 0 && is_start_wanted_) {
+    if (is_armed() && is_start_wanted_) {
       is_start_wanted_ = false;
       static_cast<void>(obey(Command::START));
       return;
@@ -139,7 +142,7 @@ class ExplorerNodelet : public GuardedNodelet {
     switch (command) {
       case Command::START:
         // A trajectory does not wait for a vehicle that does not fly.
-        answer.accepted = flight_.armed != 0 && mission_->start(now);
+        answer.accepted = is_armed() && mission_->start(now);
         break;
       case Command::PAUSE:
         answer = mission_->pause(now);
@@ -185,6 +188,9 @@ class ExplorerNodelet : public GuardedNodelet {
                                            start_state_->position_m,
                                            yaw_of(start_state_->world_from_body),
                                            now);
+    }
+    if (mission_->state() == MissionState::kWaiting && !has_failed_) {
+      start_when_armed();
     }
     if (!has_failed_) {
       const MissionStep step = mission_->on_map(map, now);
