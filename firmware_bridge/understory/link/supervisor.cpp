@@ -14,6 +14,7 @@ constexpr double kArmGapS = 0.5;
 constexpr Duration kMaxSetpointAge = std::chrono::milliseconds(100);
 constexpr Duration kMaxSetpointLead = std::chrono::milliseconds(20);
 constexpr unsigned kMaxSeqStep = 127;
+constexpr std::uint32_t kNonces = 1U << 16U;
 
 std::uint8_t byte_of(std::uint32_t value, unsigned index) {
   return static_cast<std::uint8_t>((value >> (8U * index)) & 0xFFU);
@@ -200,8 +201,8 @@ StateReason Supervisor::reason_to_land(Time now) const {
 void Supervisor::enter(State state, StateReason reason) {
   const bool is_disarming = state == State::kDisarmed && state_ != State::kArming;
   if (is_disarming) {
-    // What armed it once must not arm it again.
-    nonce_ = static_cast<std::uint32_t>(rng_.below(1U << 16U));
+    // What armed it once must not arm it again, so chance may not choose the same number twice.
+    nonce_ = (nonce_ + 1U + static_cast<std::uint32_t>(rng_.below(kNonces - 1U))) % kNonces;
   }
   if (is_disarming || state == State::kKilled) {
     arms_in_row_ = 0;

@@ -1,0 +1,106 @@
+// Copyright 2026 the Understory authors
+// SPDX-License-Identifier: BSD-3-Clause
+#include <gtest/gtest.h>
+
+#include "support/supervisor_bench.hpp"
+
+namespace understory::can {
+namespace {
+
+using std::chrono::milliseconds;
+using std::chrono::seconds;
+using test::SupervisorBench;
+
+TEST(SupervisorNonce, WhatArmedItOnceDoesNotArmItAgain) {
+  SupervisorBench bench;
+  bench.token = arm_token(bench.nonce(), bench.session);
+  bench.request = ArmRequest::kArm;
+  bench.run(seconds(1));
+  ASSERT_TRUE(bench.is_armed());
+  bench.request = ArmRequest::kDisarm;
+  bench.run(seconds(1));
+  ASSERT_EQ(bench.supervisor.state(), State::kDisarmed);
+
+  bench.request = ArmRequest::kArm;
+  bench.run(seconds(3));
+
+  EXPECT_EQ(bench.supervisor.state(), State::kArming);
+  EXPECT_EQ(bench.supervisor.reason(), StateReason::kArmToken);
+}
+
+TEST(SupervisorNonce, WithTheNewNonceItArmsAgain) {
+  SupervisorBench bench;
+  ASSERT_TRUE(bench.take_off());
+  bench.facts.is_on_ground = true;
+  bench.request = ArmRequest::kDisarm;
+  bench.run(seconds(1));
+
+  bench.request = ArmRequest::kArm;
+  bench.run(seconds(1));
+
+  EXPECT_TRUE(bench.is_armed());
+  EXPECT_EQ(bench.supervisor.report(bench.now).state_arm_seq, 2U);
+}
+
+// By faults on the ground, which disarm too.
+TEST(SupervisorNonce, NoDisarmingLeavesTheNonceAsItWas) {
+  SupervisorBench bench;
+  int repeated = 0;
+  for (int i = 0; i < 200'000; ++i) {
+    const std::uint32_t before = bench.nonce();
+    bench.facts.has_sensors = false;
+    bench.supervisor.update(bench.facts, bench.now);
+    bench.facts.has_sensors = true;
+    bench.supervisor.update(bench.facts, bench.now);
+    repeated += bench.nonce() == before ? 1 : 0;
+  }
+
+  EXPECT_EQ(repeated, 0);
+}
+
+TEST(SupervisorNonce, EveryStartHasANonceOfItsOwn) {
+  const SupervisorBench first(false, {}, 1);
+  const SupervisorBench second(false, {}, 2);
+
+  EXPECT_NE(first.nonce(), second.nonce());
+}
+
+TEST(SupervisorNonce, TheTokenIsTheChecksumOfNonceSessionAndFourLetters) {
+  // CRC-32C of 34 12 CD AB 41 52 4D 31.
+  EXPECT_EQ(arm_token(0x1234, 0xABCD), 0xCC67E07AU);
+}
+
+TEST(SupervisorNonce, AFaultOnTheGroundEndsWithItsCauseButDoesNotArm) {
+  SupervisorBench bench;
+  bench.run(seconds(1));
+  bench.facts.has_escs = false;
+  bench.run(milliseconds(100));
+  ASSERT_EQ(bench.supervisor.state(), State::kFault);
+  EXPECT_EQ(bench.supervisor.reason(), StateReason::kArmEsc);
+
+  bench.facts.has_escs = true;
+  bench.run(milliseconds(100));
+
+  EXPECT_EQ(bench.supervisor.state(), State::kDisarmed);
+  EXPECT_EQ(bench.supervisor.reason(), StateReason::kNone);
+}
+
+TEST(SupervisorNonce, AFaultWhileArmingNeedsANewRow) {
+  SupervisorBench bench;
+  bench.has_setpoints = false;
+  bench.request = ArmRequest::kArm;
+  bench.run(seconds(1));
+  bench.token = arm_token(bench.nonce(), bench.session);
+  bench.facts.has_foreign_vehicle = true;
+  bench.run(milliseconds(100));
+  ASSERT_EQ(bench.supervisor.state(), State::kFault);
+
+  bench.facts.has_foreign_vehicle = false;
+  bench.has_setpoints = true;
+  bench.run(seconds(2));
+
+  EXPECT_FALSE(bench.is_armed()) << "the nonce is another one";
+}
+
+}  // namespace
+}  // namespace understory::can
