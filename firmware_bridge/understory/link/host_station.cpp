@@ -56,7 +56,7 @@ HostStation::HostStation(const HostStationConfig& config, std::uint16_t session)
     : config_(config), session_(session) {}
 
 bool HostStation::is_silent(const std::optional<Time>& last, double limit_s, Time now) const {
-  return !last || to_seconds(now - *last) >= limit_s;
+  return !last || now - *last >= duration_from_seconds(limit_s);
 }
 
 bool HostStation::is_lost(Time now) const {

@@ -38,7 +38,11 @@ Supervisor::Supervisor(const SupervisorConfig& config, bool is_direct, const Rng
     : config_(config), is_direct_(is_direct), rng_(rng) {}
 
 bool Supervisor::is_silent(const std::optional<Time>& last, double limit_s, Time now) const {
-  return !last || to_seconds(now - *last) >= limit_s;
+  return !last || now - *last >= duration_from_seconds(limit_s);
+}
+
+bool Supervisor::is_steady(Time now) const {
+  return steady_since_ && is_silent(steady_since_, config_.steady_s, now);
 }
 
 bool Supervisor::is_flyable() const {
@@ -168,9 +172,7 @@ StateReason Supervisor::missing_for_arming(Time now) const {
   if (!was_near_) {
     return is_direct_ ? StateReason::kArmThrottle : StateReason::kArmSetpointFar;
   }
-  return steady_since_ && to_seconds(now - *steady_since_) >= config_.steady_s
-             ? StateReason::kNone
-             : StateReason::kArmNoSetpoints;
+  return is_steady(now) ? StateReason::kNone : StateReason::kArmNoSetpoints;
 }
 
 StateReason Supervisor::reason_to_land(Time now) const {
@@ -282,8 +284,7 @@ VehState Supervisor::report(Time now) const {
   report.state_arm_seq = arm_seq_ & 0xFFU;
   report.state_nonce = nonce_;
   report.flag_late = is_silent(last_set_, config_.late_s, now);
-  report.flag_setpoints = !is_silent(last_set_, config_.hold_s, now) && steady_since_ &&
-                          to_seconds(now - *steady_since_) >= config_.steady_s;
+  report.flag_setpoints = !is_silent(last_set_, config_.hold_s, now) && is_steady(now);
   report.flag_host = !is_silent(last_heartbeat_, config_.land_s, now);
   report.flag_sensors = !facts_.has_sensors;
   report.flag_batt_low = facts_.battery == BattStatus::kLow;

@@ -85,6 +85,7 @@ class Supervisor {
   [[nodiscard]] StateReason missing_for_arming(Time now) const;
   [[nodiscard]] StateReason reason_to_land(Time now) const;
   [[nodiscard]] bool is_silent(const std::optional<Time>& last, double limit_s, Time now) const;
+  [[nodiscard]] bool is_steady(Time now) const;
   [[nodiscard]] bool is_flyable() const;
   void enter(State state, StateReason reason);
   void update_grounded(Time now);
