@@ -108,16 +108,15 @@ AckResult Supervisor::on_setpoint(const WireSetpoint& wire, Time now) {
   if (state_ == State::kHold && !is_near) {
     return AckResult::kLimits;
   }
+  if (state_ == State::kLand || state_ == State::kKilled ||
+      (state_ == State::kHold && facts_.is_link_faulty)) {
+    return AckResult::kOverruled;
+  }
   update_steady(is_near, now);
-  if (state_ == State::kHold && !facts_.is_link_faulty) {
+  if (state_ == State::kHold) {
     enter(State::kArmed, StateReason::kNone);
   }
-  if (state_ == State::kArmed) {
-    return AckResult::kFlown;
-  }
-  const bool is_grounded = state_ == State::kInit || state_ == State::kDisarmed ||
-                           state_ == State::kArming || state_ == State::kFault;
-  return is_grounded ? AckResult::kNotArmed : AckResult::kOverruled;
+  return state_ == State::kArmed ? AckResult::kFlown : AckResult::kNotArmed;
 }
 
 bool Supervisor::on_esc_command(bool is_zero, Time now) {
