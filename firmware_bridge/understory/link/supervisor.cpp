@@ -98,9 +98,10 @@ AckResult Supervisor::on_setpoint(const WireSetpoint& wire, Time now) {
     return AckResult::kSequence;
   }
   const double error_m = (wire.setpoint.position_m - facts_.position_m).norm();
-  if (wire.setpoint.velocity_mps.norm() > config_.max_speed_mps ||
-      wire.setpoint.acceleration_mps2.norm() > config_.max_acceleration_mps2 ||
-      (state_ == State::kArmed && error_m > config_.max_error_m)) {
+  // Written so that what is not a number keeps no limit.
+  if (!(wire.setpoint.velocity_mps.norm() <= config_.max_speed_mps) ||
+      !(wire.setpoint.acceleration_mps2.norm() <= config_.max_acceleration_mps2) ||
+      (state_ == State::kArmed && !(error_m <= config_.max_error_m))) {
     return AckResult::kLimits;
   }
   last_seq_ = wire.seq;
