@@ -295,7 +295,7 @@ class Robustness(unittest.TestCase):
         ).stdout.strip()
         process = subprocess.Popen(
             [sys.executable, str(FLY), "--onboard", onboard, "--scenario", "clearing", "--quiet"]
-            + ["--no-report", "--out", str(folder)],
+            + ["--bus", "memory", "--no-report", "--out", str(folder)],
             start_new_session=True,
         )
         self.addCleanup(process.kill)

@@ -62,11 +62,11 @@ FlightDecision FlightControl::decide(const TrajectoryFollower* plan,
     watch(decision, telemetry, now);
     return decision;
   }
-  if (!hold_ && telemetry.is_valid) {
-    hold_ = hold_at(telemetry.state);
-  }
   if (hold_) {
     decision.setpoint = gate_.pass(*hold_, now);
+  } else if (telemetry.is_valid) {
+    decision.setpoint = gate_.pass(hold_at(telemetry.state), now);
+    hold_ = decision.setpoint;
   }
   return decision;
 }

@@ -231,6 +231,8 @@ def report(folder: Path) -> bool:
     for script in scripts:
         outcome = subprocess.run(["/usr/bin/python3", *map(str, script)], check=False)
         good = good and outcome.returncode == 0
+    if (folder / "bus.log").exists():
+        print(f"bus: {folder / 'bus.log'} (./understory log FILE says what was on it)")
     return good
 
 
