@@ -7,6 +7,8 @@
 namespace understory::can {
 namespace {
 
+constexpr double kStraightUp = 1e-5;  // cosine of the pitch: less than a step of the scale
+
 template <class... Parts>
 std::optional<FrameSet> encode_all(std::uint8_t counter, const Parts&... parts) {
   FrameSet frames;
@@ -44,9 +46,13 @@ Eigen::Quaterniond world_from_body(const Vector3d& roll_pitch_yaw_rad) {
 
 Vector3d roll_pitch_yaw_rad(const Eigen::Quaterniond& world_from_body) {
   const Eigen::Matrix3d r = world_from_body.toRotationMatrix();
-  return {std::atan2(r(2, 1), r(2, 2)),
-          std::asin(std::clamp(-r(2, 0), -1.0, 1.0)),
-          std::atan2(r(1, 0), r(0, 0))};
+  const double level = std::hypot(r(2, 1), r(2, 2));
+  const double pitch_rad = std::atan2(-r(2, 0), level);
+  // Straight up or down roll and yaw turn about the same axis, and all of it is told as yaw.
+  if (level < kStraightUp) {
+    return {0.0, pitch_rad, std::atan2(-r(0, 1), r(1, 1))};
+  }
+  return {std::atan2(r(2, 1), r(2, 2)), pitch_rad, std::atan2(r(1, 0), r(0, 0))};
 }
 
 }  // namespace
