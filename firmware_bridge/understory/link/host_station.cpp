@@ -173,8 +173,9 @@ void HostStation::on_odometry(Time now) {
   ++counters_.odometry_sets;
   const std::optional<WireOdometry> wire = odometries_.odometry();
   last_odometry_ = now;
-  is_odometry_good_ = wire && wire->quality == OdoQuality::kGood;
-  if (wire && clock_.is_set()) {
+  const bool is_usable = wire && clock_.is_set();  // else it would be of an unknown time
+  is_odometry_good_ = is_usable && wire->quality == OdoQuality::kGood;
+  if (is_usable) {
     odometry_ = Odometry{wire->state, clock_.host_time(wire->time_wire_us, now)};
   }
 }
