@@ -235,6 +235,19 @@ TEST(HostStation, AfterALostLinkItArmsWhenAskedAnew) {
   EXPECT_EQ(pair.vehicle_state(), State::kArmed);
 }
 
+TEST(HostStation, EverySessionHasAnotherNumberWhateverEndedTheLast) {
+  StationPair pair;
+  ASSERT_TRUE(pair.take_off());
+  pair.is_down_on = false;
+  pair.run(seconds(2));
+  const std::uint32_t lost = messages_in<ArmCmd>(pair.from_host).back().arm_session;
+
+  pair.host.begin_session();
+  pair.run(seconds(1));
+
+  EXPECT_NE(messages_in<ArmCmd>(pair.from_host).back().arm_session, lost);
+}
+
 TEST(HostStation, WhenTheVehicleEndsTheFlightNobodyAsksForAnother) {
   StationPair pair;
   ASSERT_TRUE(pair.take_off());

@@ -12,7 +12,6 @@ CanAutopilot::CanAutopilot(std::unique_ptr<can::CanPort> port,
                            std::uint16_t session)
     : node_(std::move(port), can::host_node_config()),
       station_(config, session),
-      session_(session),
       bus_session_(node_.port().session()) {}
 
 void CanAutopilot::on_frame(const can::PortFrame& frame) {
@@ -27,7 +26,7 @@ void CanAutopilot::watch_bus() {
   const std::uint64_t bus_session = node_.port().session();
   if (bus_session != bus_session_) {
     bus_session_ = bus_session;
-    station_.begin_session(++session_);
+    station_.begin_session();
   }
   station_.set_bus(node_.port().state() == can::PortState::kUp);
   if (node_.counters().foreign_own_ids > 0) {

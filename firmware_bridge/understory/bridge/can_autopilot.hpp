@@ -39,7 +39,6 @@ class CanAutopilot : public Autopilot, private can::FrameHandler {
 
   can::CanNode node_;
   can::HostStation station_;
-  std::uint16_t session_;
   std::uint64_t bus_session_;
   bool has_flown_ = false;
 };

@@ -83,9 +83,9 @@ void HostStation::forget_vehicle() {
   ping_.is_open = false;
 }
 
-void HostStation::begin_session(std::uint16_t session) {
+void HostStation::begin_session() {
   forget_vehicle();
-  session_ = session;
+  ++session_;
   ++counters_.sessions;
 }
 
@@ -247,7 +247,7 @@ void HostStation::tick(const std::optional<Setpoint>& setpoint,
                        Time now,
                        FrameSink& bus) {
   if (is_linked_ && is_lost(now)) {
-    begin_session(static_cast<std::uint16_t>(session_ + 1U));
+    begin_session();
   }
   is_linked_ = is_linked_ || !is_lost(now);
   if (kill_) {

@@ -58,8 +58,8 @@ class HostStation {
   // Our frame, when it was on the bus.
   void on_sent(const Frame& frame, Time sent);
   void on_other_host() { has_other_host_ = true; }
-  // The bus was lost and is back: nothing of before counts.
-  void begin_session(std::uint16_t session);
+  // The bus was lost and is back: nothing of before counts, nor does the number of the session.
+  void begin_session();
   void set_bus(bool is_up) { is_bus_up_ = is_up; }
 
   // Wishes; what becomes of them is told by vehicle().
