@@ -67,6 +67,20 @@ TEST(HostLink, AnotherHostOnTheBusIsToldAndNothingIsFlown) {
   EXPECT_EQ(pair.vehicle_state(), State::kLand);
 }
 
+// The vehicle knows best: it hears what it has not sent.
+TEST(HostLink, AVehicleThatHearsAnotherIsToldAndNothingIsFlown) {
+  StationPair pair;
+  pair.run(seconds(1));
+
+  pair.vehicle->on_foreign_vehicle();
+  pair.host.ask_arm();
+  pair.run(seconds(2));
+
+  EXPECT_EQ(pair.vehicle_state(), State::kFault);
+  EXPECT_EQ(pair.problem(), LinkProblem::kOtherVehicle);
+  EXPECT_FALSE(pair.host.is_arm_wanted());
+}
+
 TEST(HostLink, ANonceThatChangesAllTheTimeIsTwoVehicles) {
   StationPair pair;
   pair.run(seconds(1));

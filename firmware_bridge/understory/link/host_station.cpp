@@ -202,7 +202,7 @@ LinkProblem HostStation::problem(Time now) const {
   if (has_other_host_) {
     return LinkProblem::kOtherHost;
   }
-  if (nonce_changes_ >= kMostNonceChanges) {
+  if (nonce_changes_ >= kMostNonceChanges || (vehicle_ && vehicle_->flag_foreign)) {
     return LinkProblem::kOtherVehicle;
   }
   if (vehicle_heartbeat_ && (vehicle_heartbeat_->veh_proto_major != kProtocolMajor ||
