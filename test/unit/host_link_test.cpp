@@ -210,6 +210,22 @@ TEST(HostLink, APingIsTimedFromWhenItWasOnTheBus) {
   EXPECT_EQ(host.clock().round_trip(), milliseconds(1));
 }
 
+// Wall clocks are set back while they run.
+TEST(HostLink, WhenItsClockIsSetBackHeartbeatsAndPingsGoOn) {
+  StationPair pair;
+  pair.run(seconds(1));
+  pair.now -= hours(1);
+  pair.next_tick = pair.now;
+  pair.vehicle_ahead += hours(1);
+  pair.forget_records();
+
+  pair.run(seconds(1));
+
+  EXPECT_GE(messages_in<HostHb>(pair.from_host).size(), 10U);
+  EXPECT_GE(messages_in<Ping>(pair.from_host).size(), 5U);
+  EXPECT_GE(messages_in<ArmCmd>(pair.from_host).size(), 10U);
+}
+
 TEST(HostLink, EveryProblemHasItsOwnWords) {
   std::set<std::string> words;
   for (int i = 0; i <= static_cast<int>(LinkProblem::kBus); ++i) {

@@ -17,7 +17,8 @@ constexpr int kMostNonceChanges = 5;
 constexpr double kNonceWindowS = 1.0;
 
 bool is_due(std::optional<Time>& last, double period_s, Time now) {
-  if (last && now - *last < duration_from_seconds(period_s)) {
+  // Wall clocks are set back while they run.
+  if (last && now >= *last && now - *last < duration_from_seconds(period_s)) {
     return false;
   }
   last = now;

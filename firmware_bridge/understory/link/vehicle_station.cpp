@@ -87,11 +87,12 @@ bool VehicleStation::Timer::is_due(Time now) {
   if (next == Time{}) {
     next = now;
   }
-  if (now < next) {
+  const bool is_set_back = next - now > period;
+  if (now < next && !is_set_back) {
     return false;
   }
   next += period;
-  if (next <= now) {
+  if (next <= now || is_set_back) {
     next = now + period;  // stood still in between: what was missed is not made up for
   }
   return true;
