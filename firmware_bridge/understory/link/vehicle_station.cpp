@@ -199,8 +199,10 @@ void VehicleStation::on_esc_command(const Frame& frame, Time now) {
 }
 
 bool VehicleStation::is_link_faulty() const {
-  return setpoints_.is_faulty() || arms_.check().is_faulty() || heartbeats_.check().is_faulty() ||
-         esc_commands_.check().is_faulty();
+  // What the host does not send in this mode has no good frames that make good for errors.
+  const bool is_flight_faulty =
+      config_.is_direct ? esc_commands_.check().is_faulty() : setpoints_.is_faulty();
+  return is_flight_faulty || arms_.check().is_faulty() || heartbeats_.check().is_faulty();
 }
 
 void VehicleStation::follow_state() {
