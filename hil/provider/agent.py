@@ -1,8 +1,10 @@
+#!/usr/bin/python3 -BES
 # Copyright 2026 the Understory authors
 # SPDX-License-Identifier: BSD-3-Clause
-"""Inside, as first process: runs the one command for the provider and then switches off.
+"""The first process of a kernel that the bus provider boots: makes the CAN interfaces, runs the one
+command for the provider and switches off.
 
-usage: agent.py CHANNEL [REASON]   (REASON: why there is no bus; it is passed on and that is all)
+It starts without the user's Python packages and settings: these are for the command.
 """
 
 import ctypes
@@ -21,6 +23,7 @@ from typing import Any, Dict, List, Optional
 
 import frames
 from execute import execute, fail
+from machine import NoBus, prepare
 
 OUTPUT_PENDING = 65536  # more than this is not taken from the command until the host took it
 TERM_PATIENCE_S = 2.0  # for what the command left running
@@ -300,10 +303,15 @@ class Agent:
             self._command.outputs.clear()  # not even killing helped: give up on its output
 
 
-def main(arguments: List[str]) -> None:
-    agent = Agent(open_channel(arguments[0]))
-    if len(arguments) > 1:
-        agent.fail(arguments[1])
+def main() -> None:
+    reason = None
+    try:
+        prepare()
+    except (NoBus, OSError) as error:
+        reason = str(error)
+    agent = Agent(open_channel(os.environ["HIL_CHANNEL"]))
+    if reason is not None:
+        agent.fail(reason)
     else:
         agent.run()
 
@@ -312,6 +320,6 @@ if __name__ == "__main__":
     if os.getpid() != 1:  # it ends all other processes of its machine
         sys.exit("agent.py is for the first process of a booted kernel")
     try:
-        main(sys.argv[1:])
+        main()
     finally:
         power_off()

@@ -59,7 +59,7 @@ class KernelRun(contextlib.AbstractContextManager):  # type: ignore[type-arg]
             "HIL_BITRATE": job.bitrate or "",
             "HIL_QUEUE": job.queue,
         }
-        return [f"init={folder}/provider/init.sh", *(f"{k}={v}" for k, v in settings.items())]
+        return [f"init={folder}/provider/agent.py", *(f"{k}={v}" for k, v in settings.items())]
 
     def start(
         self, command: List[str], environment: Dict[str, str], kept_files: Tuple[int, ...]
