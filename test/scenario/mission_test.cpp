@@ -11,6 +11,7 @@
 #include "support/snapshot_builder.hpp"
 #include "support/temporary_folder.hpp"
 #include "understory/map/octomap_io.hpp"
+#include "understory/sim/bus_log.hpp"
 #include "understory/sim/forest_csv.hpp"
 #include "understory/sim/mission_run.hpp"
 
@@ -75,13 +76,18 @@ TEST(Mission, SameSeedGivesTheSameBytes) {
   const TemporaryFolder folder;
   std::array<std::string, 2> ticks;
   std::array<std::string, 2> maps;
+  std::array<std::string, 2> frames;
   for (std::size_t i = 0; i < 2; ++i) {
     const std::string ticks_path = folder.path_of("ticks.csv");
     MissionRun run({square_scene(5.0, 0.15), 3, std::nullopt});
+    const auto bus_log = std::make_shared<BusLog>(folder.path_of("bus.log"));
+    run.set_tap(bus_log);
     TickWriter writer(ticks_path);
     run.fly([] { return false; }, [&writer](const TickRow& row) { writer.append(row); });
     writer.close();
+    bus_log->close();
     save_octomap(run.map(), folder.path_of("map.ot"));
+    frames.at(i) = bytes_of(folder.path_of("bus.log"));
     ticks.at(i) = bytes_of(ticks_path);
     maps.at(i) = bytes_of(folder.path_of("map.ot"));
   }
@@ -89,6 +95,8 @@ TEST(Mission, SameSeedGivesTheSameBytes) {
   EXPECT_GT(ticks[0].size(), 1000U);
   EXPECT_TRUE(ticks[0] == ticks[1]);
   EXPECT_TRUE(maps[0] == maps[1]);
+  EXPECT_GT(frames[0].size(), 1'000'000U);
+  EXPECT_TRUE(frames[0] == frames[1]);
 }
 
 TEST(Mission, CollectorsClearTheTrails) {

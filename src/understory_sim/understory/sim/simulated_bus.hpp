@@ -27,6 +27,11 @@ class SimulatedBus {
                const Rng& rng,
                Time now);
 
+  // Its parts call each other.
+  SimulatedBus(const SimulatedBus&) = delete;
+  SimulatedBus& operator=(const SimulatedBus&) = delete;
+  ~SimulatedBus() = default;
+
   // The world goes on until then in steps of 2 ms, each of which `on_step` sees.
   void advance(Time until, const StepHook& on_step);
 

@@ -13,7 +13,7 @@
 #include <unistd.h>
 
 #include "understory/map/octomap_io.hpp"
-#include "understory/port/candump_writer.hpp"
+#include "understory/sim/bus_log.hpp"
 #include "understory/sim/live_line.hpp"
 #include "understory/sim/mission_run.hpp"
 #include "understory/simulate/options.hpp"
@@ -69,27 +69,6 @@ bool make_report(const std::string& folder) {
   return child > 0 && waitpid(child, &status, 0) == child && WIFEXITED(status) &&
          WEXITSTATUS(status) == 0;
 }
-
-// Writes in step with the flight: no frame is lost, and the bytes are the same every time.
-class BusLog : public can::FrameTap {
- public:
-  explicit BusLog(const std::string& path) : file_(config(path)) {}
-  void on_port_frame(const can::PortFrame& frame) override { file_.add(frame); }
-  void close() {
-    file_.flush();
-    if (const std::optional<std::string> error = file_.take_error()) {
-      throw ResultError(*error);
-    }
-  }
-
- private:
-  static can::CandumpLogConfig config(const std::string& path) {
-    can::CandumpLogConfig log;
-    log.path = path;
-    return log;
-  }
-  can::CandumpFile file_;
-};
 
 int fly_one(const Options& options) {
   RunSetup setup;
