@@ -39,7 +39,6 @@ void PowerTrain::step(const std::array<double, 4>& thrusts_n, double step_s) {
     const double motor_w = config_.max_motor_power_w * load * std::sqrt(load);
     power_w += motor_w;
     esc.speed_rpm = config_.max_speed_rpm * std::sqrt(load);
-    esc.voltage_v = battery_.voltage_v;
     esc.current_a = motor_w / open_v;
     const double warm_celsius = kAmbientCelsius + kKelvinPerWatt * kLostShare * motor_w;
     esc.temperature_celsius += (warm_celsius - esc.temperature_celsius) * step_s / kThermalTimeS;
@@ -50,6 +49,9 @@ void PowerTrain::step(const std::array<double, 4>& thrusts_n, double step_s) {
   charge_wh_ = std::max(0.0, charge_wh_ - power_w * step_s / kSecondsPerHour);
   battery_.current_a = power_w / open_v;
   battery_.voltage_v = open_v - config_.battery_ohm * battery_.current_a;
+  for (can::EscReading& esc : escs_) {
+    esc.voltage_v = battery_.voltage_v;
+  }
   battery_.charge_percent = 100.0 * charge_wh_ / config_.battery_wh;
   battery_.time_left_s = std::min(kLongestS, charge_wh_ * kSecondsPerHour / power_w);
   battery_.status = battery_.charge_percent <= config_.empty_percent ? can::BattStatus::kEmpty
