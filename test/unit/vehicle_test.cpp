@@ -256,6 +256,36 @@ TEST(Vehicle, LeavesTheGroundOnlyWhenThrustExceedsItsWeight) {
   EXPECT_GT(strong.state().position_m.z(), 0.2);
 }
 
+TEST(Vehicle, HangsStillInTheLauncherUntilItsMotorsCarryIt) {
+  VehicleConfig config;
+  config.wind = {5.0, 0.0, 1.0, 1.0};
+  const double hover = hover_commands(config.airframe)[0];
+  Vehicle vehicle(config, {1.0, 2.0, 1.5}, 0.4, Rng(1));
+  vehicle.hang_in_launcher();
+
+  run(vehicle, {}, 5.0);
+  run(vehicle, {0.98 * hover, 0.98 * hover, 0.98 * hover, 0.98 * hover}, 5.0);
+
+  EXPECT_TRUE(vehicle.on_ground());
+  EXPECT_EQ(vehicle.state().position_m, Vector3d(1.0, 2.0, 1.5));
+  EXPECT_TRUE(vehicle.state().velocity_mps.isZero());
+}
+
+TEST(Vehicle, LeavesTheLauncherOnceAndThenFallsWithoutThrust) {
+  const VehicleConfig config;
+  const double hover = hover_commands(config.airframe)[0];
+  Vehicle vehicle(config, {0.0, 0.0, 1.5}, 0.0, Rng(1));
+  vehicle.hang_in_launcher();
+
+  run(vehicle, {1.05 * hover, 1.05 * hover, 1.05 * hover, 1.05 * hover}, 1.0);
+  EXPECT_FALSE(vehicle.on_ground());
+  EXPECT_GT(vehicle.state().position_m.z(), 1.5);
+  run(vehicle, {}, 2.0);
+
+  EXPECT_TRUE(vehicle.on_ground());
+  EXPECT_EQ(vehicle.state().position_m.z(), config.gear_height_m);
+}
+
 TEST(Vehicle, ConfigurationNamesEveryField) {
   const std::string text = to_yaml(VehicleConfig{});
 
