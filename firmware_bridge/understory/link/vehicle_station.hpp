@@ -65,6 +65,8 @@ class VehicleStation {
   [[nodiscard]] const Supervisor& supervisor() const { return supervisor_; }
   [[nodiscard]] ControlMode control_mode() const { return law_.mode(); }
   [[nodiscard]] std::uint64_t setpoints_flown() const { return setpoints_flown_; }
+  // The newest of this flight.
+  [[nodiscard]] const std::optional<WireSetpoint>& flown() const { return flown_; }
 
  private:
   // Sends a message every so often, at times that do not depend on when it is asked.

@@ -22,13 +22,13 @@ SimulatedBus::SimulatedBus(const SimulatedVehicleConfig& vehicle,
   auto vehicle_port = bus_.open();
   auto host_port = bus_.open();
   can::MemoryCanPort& vehicle_end = *vehicle_port;
-  can::MemoryCanPort& host_end = *host_port;
+  host_port_ = host_port.get();
   vehicle_ =
       std::make_unique<SimulatedVehicle>(vehicle, world_from_start, rng, std::move(vehicle_port));
   host_ = std::make_unique<CanAutopilot>(
       std::move(host_port), host, static_cast<std::uint16_t>(rng.fork("session").below(1U << 16U)));
   vehicle_end.set_on_arrival([this] { vehicle_->poll(); });
-  host_end.set_on_arrival([this] { host_->poll(); });
+  host_port_->set_on_arrival([this] { host_->poll(); });
 }
 
 void SimulatedBus::advance(Time until, const StepHook& on_step) {

@@ -40,12 +40,14 @@ class SimulatedBus {
   [[nodiscard]] SimulatedVehicle& vehicle() { return *vehicle_; }
   [[nodiscard]] const SimulatedVehicle& vehicle() const { return *vehicle_; }
   [[nodiscard]] can::MemoryCanBus& bus() { return bus_; }
+  [[nodiscard]] can::MemoryCanPort& host_port() { return *host_port_; }
   [[nodiscard]] Time now() const { return now_; }
   // The clock has gone on without the world.
   void skip_to(Time now);
 
  private:
   can::MemoryCanBus bus_;
+  can::MemoryCanPort* host_port_ = nullptr;  // of the host's node
   std::unique_ptr<SimulatedVehicle> vehicle_;
   std::unique_ptr<CanAutopilot> host_;
   Time now_;
