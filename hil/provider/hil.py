@@ -53,7 +53,10 @@ def make_parser() -> argparse.ArgumentParser:
     parser.add_argument("--shell", action="store_true", help="a shell in which vcan0 is there")
     parser.add_argument("--list", action="store_true", help="which providers work here, and why")
     parser.add_argument(
-        "--provider", choices=["auto", *PROVIDERS], default="auto", help="default: the first that works"
+        "--provider",
+        choices=["auto", *PROVIDERS],
+        default="auto",
+        help="default: auto, the first that works",
     )
     parser.add_argument(
         "--interface", metavar="NAME", help="use this CAN interface of the host, as it is"
@@ -63,7 +66,7 @@ def make_parser() -> argparse.ArgumentParser:
         "--echo", action="store_true", help="frames come back once sent, not at once (vcan echo=1)"
     )
     parser.add_argument(
-        "--wire", action="store_true", help="as fast as 1 Mbit/s, a queue of 10 frames; means --echo"
+        "--wire", action="store_true", help="1 Mbit/s, a queue of 10 frames; means --echo"
     )
     parser.add_argument(
         "--memory", type=int, default=2048, metavar="MIB", help="of a booted kernel (default: 2048)"

@@ -19,7 +19,6 @@ from relay import Relay
 HERE = Path(__file__).resolve().parent
 NEEDED_INSIDE = {"ip": "iproute2", "tc": "iproute2", "modprobe": "kmod", "mount": "mount"}
 PYTHON = "/usr/bin/python3"
-LOG_LINES_SHOWN = 20
 
 
 def find_program(name: str) -> Optional[str]:

@@ -17,7 +17,8 @@ def adopt_orphans() -> None:
 
 
 def die_with_parent() -> None:
-    ctypes.CDLL(None).prctl(DIE_WITH_PARENT, signal.SIGTERM, 0, 0, 0)
+    """Even a command that ignores signals, since nobody is left to send it a second one."""
+    ctypes.CDLL(None).prctl(DIE_WITH_PARENT, signal.SIGKILL, 0, 0, 0)
 
 
 def descendants() -> List[int]:

@@ -49,8 +49,8 @@ def main() -> None:
     if options.fifo:
         become_real_time()
     late = lateness_us(options.rate, options.seconds)
-    parts = [f"p{part} {late[min(len(late) - 1, len(late) * part // 100)]:.0f}" for part in (50, 99)]
-    print(f"{len(late)} wake-ups, late by us: {', '.join(parts)}, max {late[-1]:.0f}")
+    median, most = late[len(late) // 2], late[len(late) * 99 // 100]
+    print(f"{len(late)} wake-ups, late by us: p50 {median:.0f}, p99 {most:.0f}, max {late[-1]:.0f}")
 
 
 if __name__ == "__main__":

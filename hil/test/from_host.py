@@ -26,6 +26,14 @@ trap 'sleep 0.2; echo written >"$FOLDER/file"; exit 7' INT TERM
 echo up
 while :; do sleep 0.05; done
 """
+COUNT = """
+count=0
+trap 'count=$((count + 1))' INT
+echo up
+for ((n = 0; n < 20; n++)); do sleep 0.1; done
+echo got $count
+exit 7
+"""
 STUBBORN = "trap '' INT TERM; echo up; while :; do sleep 0.05; done"
 ABOUT = """
 import json, os, sys, time
@@ -166,7 +174,8 @@ class TheCommand(FromHost):
         os.chmod(self.folder, 0o755)
         os.chown(self.temporary, 65534, 65534)
 
-        outcome = self.run_hil("--", "ip", "-brief", "link", user=65534, group=65534, extra_groups=[])
+        nobody = {"user": 65534, "group": 65534, "extra_groups": []}
+        outcome = self.run_hil("--", "ip", "-brief", "link", **nobody)
 
         self.assertIn(b"vcan0", outcome.stdout)
 
@@ -215,14 +224,16 @@ class TwoAtOnce(FromHost):
         self.assertIn(b" 222#", outputs[1])
 
 
-class AShell(FromHost):
+class OnATerminal(FromHost):
     def setUp(self):
         super().setUp()
         self.environment |= {"SHELL": "/bin/bash", "PS1": "$ ", "HOME": str(self.folder)}
+        self.seen = b""
+
+    def open(self, *words):
         self.pid, self.terminal = pty.fork()
         if self.pid == 0:
-            os.execve(COMMAND[0], [*COMMAND, "--shell"], self.environment)
-        self.seen = b""
+            os.execve(COMMAND[0], [*COMMAND, *words], self.environment)
 
     def expect(self, text):
         deadline = time.monotonic() + PATIENCE_S
@@ -236,7 +247,28 @@ class AShell(FromHost):
     def type(self, text):
         os.write(self.terminal, text)
 
-    def test_has_job_control_and_a_live_bus(self):
+    def close(self):
+        """The exit status, once it has ended."""
+        while select.select([self.terminal], [], [], PATIENCE_S)[0]:
+            try:
+                self.seen += os.read(self.terminal, 4096)
+            except OSError:
+                break
+        _, status = os.waitpid(self.pid, 0)
+        os.close(self.terminal)
+        return os.waitstatus_to_exitcode(status)
+
+    def test_a_command_gets_ctrl_c_once(self):
+        self.open("--", "bash", "-c", COUNT)
+        self.expect(b"up\r\n")
+
+        self.type(b"\x03")
+
+        self.assertEqual(self.close(), 7)
+        self.assertIn(b"got 1\r\n", self.seen)
+
+    def test_a_shell_has_job_control_and_a_live_bus(self):
+        self.open("--shell")
         self.expect(b"# ")
         self.type(b"ip -brief link show vcan0\n")
         self.expect(b"NOARP,UP")
@@ -251,14 +283,7 @@ class AShell(FromHost):
         self.type(b"exit 5\n")  # bash warns once of the stopped job
         self.type(b"exit 5\n")
 
-        while select.select([self.terminal], [], [], PATIENCE_S)[0]:
-            try:
-                os.read(self.terminal, 4096)
-            except OSError:
-                break
-        _, status = os.waitpid(self.pid, 0)
-        os.close(self.terminal)
-        self.assertEqual(os.waitstatus_to_exitcode(status), 5)
+        self.assertEqual(self.close(), 5)
 
 
 class WrongUse(FromHost):

@@ -35,7 +35,8 @@ class Native(unittest.TestCase):
 
     def test_uses_an_interface_that_is_there(self):
         with Port() as outer:
-            outcome = run(*HIL, "--interface", BUS, "--", "sh", "-c", "cansend $UNDERSTORY_CAN 123#")
+            script = "cansend $UNDERSTORY_CAN 123#"
+            outcome = run(*HIL, "--interface", BUS, "--", "sh", "-c", script)
 
             self.assertEqual(outcome.returncode, 0, outcome.stderr)
             self.assertEqual(outer.receive().id, 0x123)
