@@ -10,6 +10,7 @@ import subprocess
 from pathlib import Path
 from typing import Optional
 
+from endings import ENDING, EndingSignals
 from execute import execute
 from job import HilError, Job, environment_for
 from kernel import find_program
@@ -19,7 +20,6 @@ NEW_USER, NEW_NET, NEW_MOUNTS = 0x10000000, 0x40000000, 0x00020000
 CAN_DEVICE = "280"  # ARPHRD_CAN
 UP = 1
 FROM_KERNEL = 0x80  # si_code of what a terminal sends
-ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
 HANDLED = (*ENDING, signal.SIGUSR1, signal.SIGUSR2, signal.SIGCHLD)
 TERM_PATIENCE_S = 2.0
 ECHO_OF_VCAN = Path("/sys/module/vcan/parameters/echo")
@@ -163,7 +163,7 @@ class Native:
 
     @staticmethod
     def _wait_for(child: int) -> int:
-        ending_signals = 0
+        endings = EndingSignals()
         while True:
             info = signal.sigwaitinfo(HANDLED)
             if info.si_signo == signal.SIGCHLD:
@@ -173,8 +173,7 @@ class Native:
                 if pid == child:
                     return status
                 continue
-            ending_signals += info.si_signo in ENDING
-            if ending_signals > 1:
+            if endings.is_second(info.si_signo):
                 signal_all(signal.SIGKILL)
             elif info.si_code != FROM_KERNEL:  # else the terminal told the command as well
                 signal_all(info.si_signo)

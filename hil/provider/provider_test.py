@@ -21,6 +21,7 @@ import hil  # noqa: E402
 import processes  # noqa: E402
 import registers  # noqa: E402
 import uml  # noqa: E402
+from endings import EndingSignals  # noqa: E402
 from job import HilError, Job  # noqa: E402
 from relay import Relay  # noqa: E402
 
@@ -169,6 +170,27 @@ class RelayTest(unittest.TestCase):
     def test_notices_that_the_kernel_died(self):
         with self.assertRaisesRegex(HilError, "ended before"):
             self.relay(frames.encode(frames.READY), kernel_lives=False)
+
+
+class EndingSignalsTest(unittest.TestCase):
+    def seconds(self, *sent):
+        """Which of (time, signal) count as the second time."""
+        times = iter([0.0])
+        endings = EndingSignals(lambda: next(times))
+        found = []
+        for at_s, number in sent:
+            times = iter([at_s] * 2)
+            found.append(endings.is_second(number))
+        return found
+
+    def test_one_sent_twice_at_once_counts_once(self):
+        self.assertEqual(self.seconds((5.0, 15), (5.01, 15), (5.02, 2)), [False] * 3)
+
+    def test_a_later_one_is_the_second(self):
+        self.assertEqual(self.seconds((5.0, 2), (6.0, 15)), [False, True])
+
+    def test_others_do_not_count(self):
+        self.assertEqual(self.seconds((5.0, 10), (6.0, 15), (7.0, 10)), [False] * 3)
 
 
 class ProcessesTest(unittest.TestCase):

@@ -17,15 +17,14 @@ import tty
 from typing import Callable, Iterator, List, Optional
 
 import frames
+from endings import ENDING, EndingSignals
 from job import HilError, Job, environment_for
 
 BOOT_PATIENCE_S = 60.0
 QUIET_BOOT_S = 2.0
 KILL_PATIENCE_S = 3.0
 ENDED_EARLY = "the booted kernel ended before the command did"
-PASSED_ON = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
-PASSED_ON += (signal.SIGUSR1, signal.SIGUSR2)
-ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
+PASSED_ON = (*ENDING, signal.SIGUSR1, signal.SIGUSR2)
 TERMINAL_STOPS = (signal.SIGTTIN, signal.SIGTTOU)
 
 
@@ -81,7 +80,7 @@ class Relay:
         self._input_open = True
         self._is_ready = False
         self._status: Optional[int] = None
-        self._ending_signals = 0
+        self._endings = EndingSignals()
         self._killed_at: Optional[float] = None
         self._notice_shown = False
         self._began = time.monotonic()
@@ -236,11 +235,9 @@ class Relay:
             if number == signal.SIGWINCH:
                 self._send_size()
                 continue
-            if number in ENDING:
-                self._ending_signals += 1
             if not self._is_ready:
                 raise Interrupted(number)  # nothing runs yet: there is nothing to end cleanly
-            if self._ending_signals > 1:
+            if self._endings.is_second(number):
                 number = signal.SIGKILL
                 self._killed_at = self._killed_at or time.monotonic()
             self._send(frames.encode_number(frames.SIGNAL, number))

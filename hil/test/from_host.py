@@ -192,11 +192,20 @@ class Signals(FromHost):
                 self.assertEqual((self.folder / "file").read_text(encoding="ascii"), "written\n")
             (self.folder / "file").unlink()
 
+    def test_that_come_twice_at_once_are_one(self):
+        process = self.start("--", "bash", "-c", TRAP)
+
+        process.send_signal(signal.SIGTERM)
+        time.sleep(0.05)
+        process.send_signal(signal.SIGTERM)
+
+        self.assertEqual(process.wait(PATIENCE_S), 7)
+
     def test_kill_a_command_that_ignores_them_at_the_second_time(self):
         process = self.start("--", "bash", "-c", STUBBORN)
 
         process.send_signal(signal.SIGINT)
-        time.sleep(0.5)
+        time.sleep(1.0)
         self.assertIsNone(process.poll())
         process.send_signal(signal.SIGINT)
 

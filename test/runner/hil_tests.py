@@ -32,8 +32,9 @@ from run_hil import hil_options, test_modules  # noqa: E402  pylint: disable=wro
 
 
 def with_timeout(command):
+    # timeout(1) is deaf to a signal that it sent itself, so the two must differ.
     outer = ["timeout", f"--kill-after={KILL_S}", str(TIMEOUT_S + SECOND_SIGNAL_S)]
-    return [*outer, "timeout", str(TIMEOUT_S), *command]
+    return [*outer, "timeout", "--signal=INT", str(TIMEOUT_S), *command]
 
 
 def with_bus(options, command):
