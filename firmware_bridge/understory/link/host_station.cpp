@@ -159,8 +159,11 @@ void HostStation::on_ack(const Frame& frame, Time now) {
     return;
   }
   const SpAck& answer = received->message;
-  Ack ack;
   SentSet& set = sent_sets_[answer.ack_seq & 0xFFU];
+  if (set.set == 0) {
+    return;  // not of ours
+  }
+  Ack ack;
   ack.set = set.set;
   ack.result = answer.ack_result;
   ack.received = now;
