@@ -225,6 +225,42 @@ TEST(SimulatedBus, AnotherHostThatSpeaksUpOnTheGroundForbidsArming) {
   EXPECT_EQ(flight.telemetry.link.problem, can::LinkProblem::kOtherHost);
 }
 
+// Both hear what they have not sent.
+TEST(SimulatedBus, OfTwoVehiclesOnOneBusNoneIsArmed) {
+  for (std::uint64_t seed = 1; seed <= 5; ++seed) {
+    BusFlight flight(seed);
+    auto port = flight.bus->bus().open();
+    can::MemoryCanPort& end = *port;
+    SimulatedVehicle other({}, BusFlight::start(), Rng(100 + seed), std::move(port));
+    end.set_on_arrival([&other] { other.poll(); });
+    flight.on_step = [&](const VehicleState&) { other.step(flight.bus->bus().now()); };
+
+    for (int i = 0; i < 500; ++i) {
+      flight.bus->host().arm();
+      flight.tick();
+      ASSERT_NE(flight.vehicle_state(), State::kArmed) << "seed " << seed;
+      ASSERT_NE(other.station().supervisor().state(), State::kArmed) << "seed " << seed;
+    }
+
+    EXPECT_EQ(flight.telemetry.link.problem, can::LinkProblem::kOtherVehicle) << "seed " << seed;
+  }
+}
+
+TEST(SimulatedBus, OfTwoHostsOnOneBusNoneArms) {
+  BusFlight flight;
+  CanAutopilot other(flight.bus->bus().open(), can::HostStationConfig{}, 999);
+  for (int i = 0; i < 500; ++i) {
+    flight.bus->host().arm();
+    other.arm();
+    flight.tick();
+    other.send(flight.wanted, true, flight.now());
+    ASSERT_NE(flight.vehicle_state(), State::kArmed);
+  }
+
+  EXPECT_EQ(flight.telemetry.link.problem, can::LinkProblem::kOtherHost);
+  EXPECT_EQ(other.receive(flight.now()).link.problem, can::LinkProblem::kOtherHost);
+}
+
 class BusThatIs : public ::testing::TestWithParam<can::PortState> {};
 
 TEST_P(BusThatIs, LostForTheHostIsLandedAndReadyAgainWhenItIsBack) {
