@@ -119,7 +119,15 @@ class Host {
     const Telemetry telemetry = autopilot_.receive(now);
     wish(telemetry);
     std::optional<Setpoint> setpoint;
-    if (telemetry.is_following && !is_landing_) {
+    if (!telemetry.is_valid) {
+      // Where it is is not known: no further than where it was to be.
+      if (last_) {
+        last_->velocity_mps.setZero();
+        last_->acceleration_mps2.setZero();
+        setpoint = gate_.pass(*last_, now);
+      }
+      start_.reset();
+    } else if (telemetry.is_following && !is_landing_) {
       if (!start_) {
         start_ = hold_at(telemetry);
         flying_ns_ = steady_ns();
@@ -127,10 +135,9 @@ class Host {
       setpoint = gate_.pass(circle(options_, *start_, since_s(flying_ns_)), now);
     } else {
       start_.reset();  // whatever comes next begins where it is
-      if (telemetry.is_valid) {
-        setpoint = gate_.pass(hold_at(telemetry), now);
-      }
+      setpoint = gate_.pass(hold_at(telemetry), now);
     }
+    last_ = setpoint;
     autopilot_.send(setpoint, !start_.has_value(), now);
     show(telemetry, now);
   }
@@ -207,6 +214,7 @@ class Host {
   std::int64_t flying_ns_ = 0;
   std::int64_t landing_ns_ = 0;
   std::optional<Setpoint> start_;
+  std::optional<Setpoint> last_;
   bool has_flown_ = false;
   bool is_landing_ = false;
   bool has_ended_ = false;
