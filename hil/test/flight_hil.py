@@ -1,0 +1,116 @@
+# Copyright 2026 the Understory authors
+# SPDX-License-Identifier: BSD-3-Clause
+"""A flight on which nothing goes wrong, and what logs say of it."""
+
+import bisect
+import tempfile
+import unittest
+from pathlib import Path
+from typing import Any
+
+from bench import BY_ID, HOST_BUS, MEMORY, FlightTest, program, summary_of
+from can_tools import wait_until
+
+RADIUS_M = 1.0
+TRACKING_M = 0.3
+# Of a flight without losses: a machine that stands still for a moment explains a few.
+FEW = 0.02
+AT_WORK_S = 0.003
+
+
+class AFlight(FlightTest):
+    def setUp(self) -> None:
+        super().setUp()
+        folder = tempfile.TemporaryDirectory(prefix="flight_hil_", dir=MEMORY)
+        self.addCleanup(folder.cleanup)
+        self.folder = Path(folder.name)
+        self.log_path = self.folder / "own.log"
+
+    def fly_and_land(self, *words: Any) -> None:
+        dump = self.run_program("env", "-C", self.folder, "candump", "-l", "-r", 8388608, HOST_BUS)
+        wait_until(lambda: list(self.folder.glob("candump*")), "candump's file")
+        self.start_vehicle()
+        host = self.start_host("--log", self.log_path, *words)
+        self.assertEqual(host.wait(40.0), 0, host.lines)
+        self.assertEqual(dump.stop(), 0)
+        self.dump_path = next(self.folder.glob("candump*"))
+
+    def check_answers(self) -> None:
+        """The vehicle answers only the newest of the sets that it finds waiting."""
+        commits = self.bus.of("SP_COMMIT")
+        acks = {(said["AckSeq"], int(said.stamp_s)) for said in self.bus.of("SP_ACK")}
+        of_vehicle = [s for s, number, _ in self.bus.frames if BY_ID[number].sender == "VEH"]
+        unanswered = 0
+        for said, after in zip(commits, commits[1:]):
+            if {(said["SpSeq"], int(said.stamp_s) + later_s) for later_s in (0, 1)} & acks:
+                continue
+            unanswered += 1
+            first = bisect.bisect(of_vehicle, said.stamp_s + AT_WORK_S)
+            self.assertGreater(of_vehicle[first], after.stamp_s - AT_WORK_S, "it was at work")
+        results = {said["AckResult"] for said in self.bus.of("SP_ACK")}
+        print(f"    {len(commits)} sets, {unanswered} overtaken by the next one, {results}")
+        self.assertLessEqual({"FLOWN", "NOT_ARMED"}, results)
+        self.assertLessEqual(results, {"FLOWN", "NOT_ARMED", "OVERRULED", "STALE"})
+
+    def check_logs(self) -> None:
+        """Frame by frame, with the same stamps; candump was there before and after."""
+        ours, theirs = (
+            path.read_text(encoding="ascii").splitlines()
+            for path in (self.log_path, self.dump_path)
+        )
+        begin = theirs.index(ours[0])
+        self.assertEqual(theirs[begin : begin + len(ours)], ours)
+
+    def check_summary(self) -> None:
+        for path in (self.log_path, self.dump_path):
+            summary = summary_of(path)
+            spans = [(span["state"], span["reason"]) for span in summary["vehicle"]]
+            lost = {name: s["lost"] for name, s in summary["messages"].items() if s["lost"]}
+            print(f"    {path.name}: {summary['frames']} frames, lost: {lost}, {spans}")
+            self.assertEqual(spans[-3:], [("ARMED", "NONE"), ("LAND", "HOST_REQUEST"),
+                                          ("DISARMED", "LANDED")])  # fmt: skip
+            self.assertEqual(summary["other"], {})
+            self.assertEqual(summary["foreign"], [])
+            for name, stream in summary["messages"].items():
+                wrong = stream["checksum"] + stream["code"] + stream["length"] + stream["repeated"]
+                self.assertEqual(wrong, 0, f"{path.name}: {name}")
+                self.assertLessEqual(stream["lost"], 2 + FEW * stream["count"], name)
+            for name, sets in summary["sets"].items():
+                self.assertLessEqual(sets["torn"], 2 + FEW * sets["complete"], name)
+
+    def test_arms_flies_and_lands_and_logs_tell_all_of_it(self) -> None:
+        self.fly_and_land("--duration", 4)
+
+        self.check_answers()
+        self.check_logs()
+        self.check_summary()
+
+    def test_follows_the_circle_it_was_told(self) -> None:
+        self.fly_and_land("--duration", 5)
+
+        flown = self.bus.of("SP_POS_XY")
+        worst_m = 0.0
+        armed_s = self.bus.wait_for_state("ARMED").stamp_s
+        landing_s = self.bus.wait_for_state("LAND").stamp_s
+        for stamp_s, x_m, y_m, _ in self.bus.positions(armed_s):
+            wanted = [said for said in flown if abs(said.stamp_s - stamp_s) < 0.008]
+            if wanted and stamp_s < landing_s:
+                away_m = min(abs(x_m - w["SpX"]) + abs(y_m - w["SpY"]) for w in wanted)
+                worst_m = max(worst_m, away_m)
+        print(f"    at most {worst_m:.3f} m off")
+        self.assertLess(worst_m, TRACKING_M)
+
+    def test_needs_no_privileges(self) -> None:
+        nobody = ["setpriv", "--reuid=65534", "--regid=65534", "--clear-groups"]
+        began = [*nobody, program("understory_vehicle"), "--interface", HOST_BUS]
+        vehicle = self.run_program(*began)
+        vehicle.wait_for_line("DISARMED")
+        host = self.run_program(
+            *nobody, program("understory_host"), "--height", 0.2, "--duration", 1
+        )
+
+        self.assertEqual(host.wait(40.0), 0, host.lines)
+
+
+if __name__ == "__main__":
+    unittest.main()
