@@ -310,14 +310,17 @@ class FlightTest(unittest.TestCase):
         self.bus = self.listen(self.host_bus)
 
     def run(self, result: Optional[unittest.TestResult] = None) -> Optional[unittest.TestResult]:
-        """What the programs said last tells most about a failure."""
         before = 0 if result is None else len(result.failures) + len(result.errors)
         outcome = super().run(result)
         if outcome is not None and len(outcome.failures) + len(outcome.errors) > before:
-            for started in self.programs:
-                print("   ", " ".join(map(str, started.process.args)))
-                print(*(f"      {line}" for line in started.lines[-LINES_SHOWN:]), sep="\n")
+            self.show_programs()
         return outcome
+
+    def show_programs(self) -> None:
+        """What they said last tells most about a failure."""
+        for started in self.programs:
+            print("   ", " ".join(map(str, started.process.args)))
+            print(*(f"      {line}" for line in started.lines[-LINES_SHOWN:]), sep="\n")
 
     def listen(self, interface: str, names: Sequence[str] = HEARD) -> Listener:
         listener = Listener(interface, names)
@@ -394,6 +397,7 @@ class Wire(Program):
         answers = len(self.lines)
         self.tell(json.dumps(faults))
         wait_until(lambda: len(self.lines) > answers, "the wire to answer")
+        self.counts()
         return time.time()
 
     def counts(self) -> Dict[str, int]:
