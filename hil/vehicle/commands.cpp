@@ -6,6 +6,7 @@
 #include <sstream>
 #include <stdexcept>
 
+#include <fmt/core.h>
 #include <poll.h>
 #include <unistd.h>
 
@@ -13,8 +14,8 @@ namespace understory {
 namespace {
 
 struct Word {
-  const char* name;
-  Fault fault;
+  const char* name = "";
+  Fault fault = Fault::kQuit;
   std::optional<double> most;  // takes a value from 0 to this
 };
 constexpr std::array<Word, 7> kWords{{{"freeze", Fault::kFreeze, {}},
@@ -41,10 +42,9 @@ FaultCommand parse_fault(const std::string& text) {
     const bool has_value = !word.most || (words >> command.value && command.value >= 0.0 &&
                                           command.value <= *word.most);
     if (!has_value || words >> excess) {
-      throw std::invalid_argument(
-          "'" + text + "': " + name +
-          (word.most ? " takes a number from 0 to " + std::to_string(static_cast<int>(*word.most))
-                     : std::string(" takes nothing")));
+      const std::string takes =
+          word.most ? fmt::format("a number from 0 to {:.0f}", *word.most) : "nothing";
+      throw std::invalid_argument(fmt::format("'{}': {} takes {}", text, name, takes));
     }
     return command;
   }

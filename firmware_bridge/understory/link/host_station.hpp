@@ -130,13 +130,6 @@ class HostStation {
   void send(const Message& message, Outbox& outbox, Time now, FrameSink& bus);
 
   HostStationConfig config_;
-  std::uint16_t session_;
-  bool is_arm_wanted_ = false;
-  bool was_armed_ = false;  // since it was asked for
-  std::optional<KillReason> kill_;
-  bool has_other_host_ = false;
-  bool is_bus_up_ = true;
-  bool is_linked_ = false;
 
   Inbox<VehState> states_;
   Inbox<VehHb> heartbeats_;
@@ -148,31 +141,40 @@ class HostStation {
   std::optional<VehHb> vehicle_heartbeat_;
   std::optional<Battery> battery_;
   std::optional<Odometry> odometry_;
-  bool is_odometry_good_ = false;
   std::optional<Time> last_state_;
   std::optional<Time> last_odometry_;
   std::optional<Time> first_tick_;
-  int nonce_changes_ = 0;
   std::optional<Time> first_nonce_change_;
 
   ClockSync clock_;
   SentPing ping_;
   std::array<SentSet, 256> sent_sets_{};
   std::optional<Ack> last_ack_;
-  std::uint8_t seq_ = 0;
 
+  std::optional<Time> last_arm_;
+  std::optional<Time> last_heartbeat_;
+  std::optional<Time> last_ping_;
+  std::optional<Time> last_link_;
+  Counters counters_;
+
+  // Small ones, together.
+  std::optional<KillReason> kill_;
+  int nonce_changes_ = 0;
+  std::uint16_t session_;
+  bool is_arm_wanted_ = false;
+  bool was_armed_ = false;  // since it was asked for
+  bool has_other_host_ = false;
+  bool is_bus_up_ = true;
+  bool is_linked_ = false;
+  bool is_odometry_good_ = false;
+  bool last_arm_wanted_ = false;
+  std::uint8_t seq_ = 0;
   Outbox set_counter_;
   Outbox arm_counter_;
   Outbox kill_counter_;
   Outbox heartbeat_counter_;
   Outbox ping_counter_;
   Outbox link_counter_;
-  std::optional<Time> last_arm_;
-  bool last_arm_wanted_ = false;
-  std::optional<Time> last_heartbeat_;
-  std::optional<Time> last_ping_;
-  std::optional<Time> last_link_;
-  Counters counters_;
 };
 
 }  // namespace understory::can
