@@ -112,6 +112,8 @@ TEST(FlightControl, WhereThePlanHasEndedIsAHoldAtItsEnd) {
 
   flight.fly_for(seconds(5) - kTick);
   EXPECT_FALSE(flight.decision.is_at_rest);
+  flight.tick();
+  EXPECT_TRUE(flight.decision.is_at_rest);
   flight.fly_for(seconds(1));
 
   EXPECT_TRUE(flight.decision.is_at_rest);
@@ -185,6 +187,18 @@ TEST(FlightControl, AVehicleJustWithinAMetreIsNotAstray) {
   EXPECT_FALSE(flight.control.is_astray());
 }
 
+TEST(FlightControl, AVehicleExactlyAMetreOffIsNotAstray) {
+  Flight flight;
+  flight.telemetry.is_following = true;
+  flight.fly_for(seconds(6));
+  flight.offset_m = {1.0, 0.0, 0.0};  // from x = -1 m, so that nothing is rounded
+
+  flight.fly_for(seconds(1));
+
+  EXPECT_EQ((flight.decision.setpoint->position_m - flight.telemetry.state.position_m).norm(), 1.0);
+  EXPECT_FALSE(flight.control.is_astray());
+}
+
 TEST(FlightControl, AMomentWithinAMetreBeginsThePatienceAnew) {
   Flight flight;
   flight.telemetry.is_following = true;
@@ -230,6 +244,21 @@ TEST(FlightControl, AnAstrayVehicleHoldsWhereItIsAndFliesNoPlanAgain) {
   }
 
   EXPECT_LT((flight.decision.setpoint->position_m - here_m).norm(), 1.21);
+}
+
+TEST(FlightControl, AHoldOfBeforeThePlanIsNotTakenUpAfterIt) {
+  Flight flight;
+  flight.has_plan = false;
+  flight.telemetry.is_following = true;
+  flight.tick();  // holds at home
+  flight.has_plan = true;
+  flight.fly_for(seconds(4));
+  flight.offset_m = {0.0, 1.2, 0.0};
+  while (flight.decision.flown != nullptr) {
+    flight.tick();
+  }
+
+  EXPECT_GT((flight.decision.setpoint->position_m - kHome_m).norm(), 1.5);
 }
 
 TEST(FlightControl, OnceTheVehicleHeldByItselfNoPlanIsFlownAgain) {

@@ -147,6 +147,18 @@ TEST(SetpointGate, StepIsLimitedToWhatTheSpeedLimitExplainsAndTheConfiguredJump)
   EXPECT_TRUE(same(answer_to(ahead), held(moving())));
 }
 
+TEST(SetpointGate, WhatIsJustAtEveryLimitPasses) {
+  GateConfig exact = config();
+  exact.max_step_m = 0.25;
+  SetpointGate gate(exact, kBox_m);
+  ASSERT_TRUE(gate.pass(at(1.0), tick(0)));
+  Setpoint limit = at(1.25);
+  limit.velocity_mps = {0.0, -4.0, 0.0};
+  limit.acceleration_mps2 = {0.0, 0.0, 6.0};
+
+  EXPECT_TRUE(same(gate.pass(limit, tick(0)), limit));
+}
+
 TEST(SetpointGate, HoldRepeatsTheLastGoodPositionForAsLongAsNothingPasses) {
   SetpointGate gate(config(), kBox_m);
   ASSERT_TRUE(gate.pass(at(0.9), tick(0)));

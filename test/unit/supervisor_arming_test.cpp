@@ -182,9 +182,9 @@ TEST(SupervisorArming, OneSetpointFartherThanAMetreBeginsTheHalfSecondAnew) {
   EXPECT_TRUE(bench.is_armed());
 }
 
-TEST(SupervisorArming, ASetpointJustWithinAMetreIsNear) {
+TEST(SupervisorArming, ASetpointAMetreOffIsNear) {
   SupervisorBench bench;
-  bench.wire.setpoint.position_m.x() += 0.999;
+  bench.wire.setpoint.position_m.x() += 1.0;
   bench.request = ArmRequest::kArm;
 
   bench.run(seconds(1));

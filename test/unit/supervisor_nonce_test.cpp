@@ -58,6 +58,19 @@ TEST(SupervisorNonce, NoDisarmingLeavesTheNonceAsItWas) {
   EXPECT_EQ(repeated, 0);
 }
 
+TEST(SupervisorNonce, FitsTheSixteenBitsThatItHasOnTheBusAndUsesAllOfThem) {
+  SupervisorBench bench;
+  std::uint32_t used = 0;
+  for (int i = 0; i < 1000; ++i) {
+    bench.facts.has_sensors = i % 2 == 0;
+    bench.supervisor.update(bench.facts, bench.now);
+    ASSERT_LE(bench.nonce(), 0xFFFFU);
+    used |= bench.nonce();
+  }
+
+  EXPECT_EQ(used, 0xFFFFU);
+}
+
 TEST(SupervisorNonce, EveryStartHasANonceOfItsOwn) {
   const SupervisorBench first(false, {}, 1);
   const SupervisorBench second(false, {}, 2);

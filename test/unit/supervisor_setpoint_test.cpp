@@ -125,10 +125,10 @@ struct SupervisorSetpoint : public ::testing::Test {
   SupervisorBench bench;
 };
 
-TEST_F(SupervisorSetpoint, ASetpointJustWithinEveryLimitIsFlown) {
-  bench.wire.setpoint.position_m = bench.facts.position_m + Vector3d(0.0, 2.999, 0.0);
-  bench.wire.setpoint.velocity_mps = {0.0, 11.999, 0.0};
-  bench.wire.setpoint.acceleration_mps2 = {0.0, 0.0, -19.999};
+TEST_F(SupervisorSetpoint, ASetpointJustAtEveryLimitIsFlown) {
+  bench.wire.setpoint.position_m = bench.facts.position_m + Vector3d(0.0, 3.0, 0.0);
+  bench.wire.setpoint.velocity_mps = {0.0, 12.0, 0.0};
+  bench.wire.setpoint.acceleration_mps2 = {0.0, 0.0, -20.0};
   bench.wire.mode = SpMode::kHold;
 
   EXPECT_EQ(bench.send_setpoint(), AckResult::kFlown);
