@@ -23,7 +23,7 @@ BAD_RESULTS = ("STALE", "SEQUENCE", "LIMITS", "UNSUPPORTED")
 BAD_STATES = ("KILLED", "FAULT")
 FAILSAFE_STATES = ("HOLD", "LAND")  # but for these reasons:
 WANTED = ("NONE", "HOST_REQUEST")
-FLYING = ("ARMED", "HOLD", "LAND")
+FLYING = ("ARMED", "HOLD")
 LINK_ERRORS = {
     "CrcErr": "wrong checksums",
     "Lost": "lost",
