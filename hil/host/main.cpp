@@ -120,12 +120,13 @@ class Host {
     wish(telemetry);
     std::optional<Setpoint> setpoint;
     if (!telemetry.is_valid) {
-      // Where it is is not known: no further than where it was to be.
+      // Where it is is not known: no further than where it was to be. The gate has passed that, and
+      // must not learn that nothing has moved meanwhile.
       if (last_) {
         last_->velocity_mps.setZero();
         last_->acceleration_mps2.setZero();
-        setpoint = gate_.pass(*last_, now);
       }
+      setpoint = last_;
       start_.reset();
     } else if (telemetry.is_following && !is_landing_) {
       if (!start_) {
