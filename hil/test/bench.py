@@ -29,7 +29,7 @@ RECEIVE_BUFFER_FORCE = 33  # SO_RCVBUFFORCE
 FILTER_MASK = 0xC00007FF  # 11 bits, neither extended nor remote
 RECEIVE_BUFFER_BYTES = 8 << 20
 LAUNCHER_HEIGHT_M = 1.0
-LINES_SHOWN = 12  # of a program, where a test fails
+LINES_SHOWN = 5  # of a program, where a test fails
 # For logs: writing to the folders of the machine around it may stop a booted kernel for a while.
 MEMORY = "/dev/shm"
 
