@@ -55,7 +55,7 @@ struct FlightTick {
   // The first turn that knew of a new trajectory, whether or not its time had come.
   bool is_first_with_plan = false;
   Time plan_depth_stamp{};  // of the newest trajectory known
-  bool is_astray = false;  // not where the trajectory is: it holds from then on
+  bool is_astray = false;   // not where the trajectory is: it holds from then on
   std::uint64_t gate_violations = 0;
   std::uint64_t skipped_deadlines = 0;
 };

@@ -110,8 +110,7 @@ void Vehicle::step(const MotorCommands& commands, double step_s) {
   const bool is_low = state_.position_m.z() <= config_.gear_height_m;
   on_ground_ = is_in_launcher_ || (is_low && state_.velocity_mps.z() <= 0.0);
   if (on_ground_) {
-    const Vector3d on_ground_m(
-        state_.position_m.x(), state_.position_m.y(), config_.gear_height_m);
+    const Vector3d on_ground_m(state_.position_m.x(), state_.position_m.y(), config_.gear_height_m);
     stand(was_standing ? stood_at_m_ : on_ground_m, step_s);
   }
 }
