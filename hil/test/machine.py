@@ -10,6 +10,7 @@ Run as a program it writes, for each time it was woken too late, from when to wh
 import contextlib
 import functools
 import os
+import signal
 import subprocess
 import sys
 import time
@@ -23,6 +24,7 @@ GAP_S = 0.03  # one alone is trouble
 MOST_LATE = 0.01  # of the time
 LEAST_IDLE = 0.05  # of the processor's time
 ATTEMPTS = 3
+ATTEMPT_PATIENCE_S = 120
 
 
 def watch() -> None:
@@ -92,6 +94,7 @@ def tried_again(test: Callable[[Any], None]) -> Callable[[Any], None]:
     def tried(self: Any) -> None:
         for attempt in range(1, ATTEMPTS + 1):
             machine = self.machine = Machine()
+            signal.alarm(signal.alarm(0) and ATTEMPT_PATIENCE_S)  # the runner's, for each anew
             try:
                 test(self)
                 return
