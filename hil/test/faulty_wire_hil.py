@@ -7,7 +7,8 @@ import time
 import unittest
 from typing import Any
 
-from bench import FLYING, WireTest
+from bench import FLYING
+from wire_bench import WireTest
 
 HIL_OPTIONS = ["--interfaces", "2"]
 FLIGHT_S = 3.0

@@ -13,6 +13,7 @@ import time
 import xml.etree.ElementTree
 from pathlib import Path
 
+from catkin_check import built_workspace
 from commands import ROOT, run_logged, say, show_log
 from results import SuiteResult
 from ros_tests import count_file
@@ -106,6 +107,7 @@ def run_hil_tests(build_folder=None):
         else:
             result.failed.append(reason)
         return result
+    built_workspace()  # whole missions fly the onboard process; if it does not compile, they say so
     RESULTS.mkdir(parents=True, exist_ok=True)
     folder = Path(tempfile.mkdtemp(prefix="run_", dir=RESULTS))
     with concurrent.futures.ThreadPoolExecutor(AT_ONCE) as pool:
