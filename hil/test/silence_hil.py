@@ -6,7 +6,8 @@ import time
 import unittest
 from typing import List
 
-from bench import ODOMETRY, SETPOINT, FlightTest, Said, WireTest
+from bench import ODOMETRY, SETPOINT, FlightTest, Said
+from wire_bench import WireTest
 
 HIL_OPTIONS = ["--interfaces", "2"]
 LATE_S, HOLD_S, LAND_S = 0.05, 0.25, 1.0

@@ -6,7 +6,8 @@ import time
 import unittest
 from typing import Any
 
-from bench import HOST_BUS, PROTOCOL_HASH, FlightTest, Program, WireTest, program
+from bench import HOST_BUS, PROTOCOL_HASH, FlightTest, Program, program
+from wire_bench import WireTest
 from can_tools import must_run
 
 HIL_OPTIONS = ["--interfaces", "2"]
