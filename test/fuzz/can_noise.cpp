@@ -5,6 +5,7 @@
 // ones, and those of a real flight with bits altered. The same frames every time.
 #include <cstdio>
 #include <cstdlib>
+#include <exception>
 
 #include "fuzz/can_target.hpp"
 #include "support/frame_noise.hpp"
@@ -32,10 +33,10 @@ std::vector<understory::can::Frame> real_frames() {
 
 }  // namespace
 
-int main(int argc, char** argv) {
-  const long long count = argc > 1 ? std::atoll(argv[1]) : 0;
+int main(int argc, char** argv) try {
+  const long long count = argc > 1 ? std::strtoll(argv[1], nullptr, 10) : 0;
   if (count <= 0) {
-    std::fputs("usage: can_noise FRAMES\n", stderr);
+    std::fputs("usage: understory_can_noise FRAMES\n", stderr);
     return 2;
   }
   FrameNoise noise(understory::Rng(20), real_frames());
@@ -47,4 +48,7 @@ int main(int argc, char** argv) {
               count,
               static_cast<unsigned long long>(target.decoded()));
   return 0;
+} catch (const std::exception& error) {
+  std::fprintf(stderr, "understory_can_noise: %s\n", error.what());
+  return 1;
 }

@@ -71,8 +71,7 @@ SWAPS = [
 ]
 NUMBER = re.compile(r"(?<![\w.])(\d+\.\d+|\d+)(U?)(?![\w.])")
 STATEMENT = re.compile(
-    r"^\s+(?:[\w.\->\[\]]+ (?:[-+|&]?=) .+;|[\w.\->\[\]]+ = [\w.]+ = .+;|\+\+[\w.]+;|[\w.\->]+\(.*\);|(?:return|break);)"
-    r"(?:\s*//.*)?$"
+    r"^\s+(?:[\w.\->\[\]]+ [-+|&]?= .+;|\+\+[\w.]+;|[\w.\->]+\(.*\);|(?:return|break);)$"
 )
 CONDITION = re.compile(r"^(\s*(?:\} else )?if \()(.+)(\) \{)$")
 RETURN = re.compile(r"^(\s*return )([^;]*(?:&&|\|\||==|!=|<=|>=|[<>] |is_\w+|!)[^;]*)(;)$")
@@ -96,7 +95,8 @@ def mutants_of(source):
                 found.append(Mutant(number, match.start(), match[0], new))
         for match in NUMBER.finditer(code):
             old = match[0]
-            new = f"{float(match[1]) * 1.5 + 0.1}" if "." in old else f"{int(match[1]) + 1}{match[2]}"
+            is_whole = "." not in old
+            new = f"{int(match[1]) + 1}{match[2]}" if is_whole else f"{float(match[1]) * 1.5 + 0.1}"
             found.append(Mutant(number, match.start(), old, new))
         if STATEMENT.match(code):
             start = len(code) - len(code.lstrip())
@@ -105,6 +105,15 @@ def mutants_of(source):
             if whole and "?" not in whole[2]:
                 found.append(Mutant(number, whole.start(2), whole[2], f"!({whole[2]})"))
     return found
+
+
+def place_of(source, number):
+    """The line, and what goes before it until nobody takes it for another one."""
+    place = source[number - 1].strip()
+    while len(place) < 24 and number > 1:
+        number -= 1
+        place = f"{source[number - 1].strip()} {place}"
+    return place
 
 
 def mutated(source, mutant):
@@ -179,8 +188,9 @@ class Laboratory:
 def explained():
     """(file name, line of code, change) that docs/mutation.md lists."""
     page = ROOT / "docs/mutation.md"
-    rows = re.findall(r"^\| `(\w+)` \| `(.+?)` \| `(.*?)` \|", page.read_text(), re.M) if page.exists() else []
-    return {(name, code.replace("\\|", "|"), change.replace("\\|", "|")) for name, code, change in rows}
+    text = page.read_text() if page.exists() else ""
+    rows = re.findall(r"^\| `(\w+)` \| `(.+?)` \| `(.*?)` \|", text, re.M)
+    return {tuple(cell.replace("\\|", "|") for cell in row) for row in rows}
 
 
 def examine(name, build, folder):
@@ -195,12 +205,13 @@ def examine(name, build, folder):
         fate = laboratory.fate(mutated(text, mutant))
         fates[fate] += 1
         if fate == "survived":
-            code = text[mutant.line - 1].strip()
+            code = place_of(text, mutant.line)
             change = f"{mutant.old.strip()} -> {mutant.new.strip()}"
             survivors.append((name, code, change))
             print(f"{source}:{mutant.line}: {change}    {code}", flush=True)
     total = fates["killed"] + fates["survived"]
-    print(f"{name}: {fates['killed']} of {total} killed ({fates['invalid']} did not compile)", flush=True)
+    rest = f"{fates['invalid']} did not compile"
+    print(f"{name}: {fates['killed']} of {total} killed ({rest})", flush=True)
     return survivors
 
 

@@ -175,7 +175,7 @@ TEST(ClockSync, FollowsADriftingClockWithinAMillisecond) {
   Exchange exchange{hours(1), {}};
   for (int i = 0; i < 3000; ++i) {
     const Time now = Time(i * milliseconds(200));
-    exchange.ahead = hours(1) + Duration(i * 20);
+    exchange.ahead = hours(1) + i * Duration(20);
     exchange.ping(now,
                   Duration(100 + static_cast<std::int64_t>(rng.below(400))),
                   Duration(100 + static_cast<std::int64_t>(rng.below(400))));

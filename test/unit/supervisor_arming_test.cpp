@@ -17,8 +17,8 @@ using test::SupervisorBench;
 struct Lack {
   std::string name;
   std::function<void(SupervisorBench&)> take_away;
-  State state;
-  StateReason reason;
+  State state{};
+  StateReason reason{};
   bool is_direct = false;
 };
 

@@ -45,6 +45,7 @@ TEST_F(SupervisorFlight, AQuarterSecondWithoutASetpointIsHeld) {
 
   EXPECT_EQ(bench.supervisor.state(), State::kHold);
   EXPECT_EQ(bench.supervisor.reason(), StateReason::kSetpointSilence);
+  EXPECT_EQ(bench.supervisor.report(bench.now).state_reason, StateReason::kSetpointSilence);
 }
 
 TEST_F(SupervisorFlight, ASecondWithoutASetpointLands) {
@@ -133,6 +134,13 @@ TEST_F(SupervisorFlight, ALandingEndsDisarmedOnceItIsDown) {
   EXPECT_EQ(bench.supervisor.state(), State::kDisarmed);
   EXPECT_EQ(bench.supervisor.reason(), StateReason::kLanded);
   EXPECT_NE(bench.nonce(), nonce);
+}
+
+// Before the motors turn the control law says so.
+TEST_F(SupervisorFlight, ToBeDownEndsALandingAndNothingElse) {
+  bench.facts.is_down = true;
+
+  EXPECT_FALSE(bench.leaves(State::kArmed, seconds(1)).has_value());
 }
 
 TEST_F(SupervisorFlight, AFaultyLinkHoldsUntilItIsSoundAndASetpointComes) {
@@ -247,7 +255,7 @@ TEST(Supervisor, KillIsHeardOnTheGroundToo) {
 struct Trouble {
   std::string name;
   std::function<void(VehicleFacts&)> happen;
-  StateReason reason;
+  StateReason reason{};
 };
 
 std::string trouble_name(const ::testing::TestParamInfo<Trouble>& info) {

@@ -46,7 +46,7 @@ TEST(SupervisorNonce, WithTheNewNonceItArmsAgain) {
 TEST(SupervisorNonce, NoDisarmingLeavesTheNonceAsItWas) {
   SupervisorBench bench;
   int repeated = 0;
-  for (int i = 0; i < 200'000; ++i) {
+  for (int i = 0; i < 1'000'000; ++i) {
     const std::uint32_t before = bench.nonce();
     bench.facts.has_sensors = false;
     bench.supervisor.update(bench.facts, bench.now);
@@ -56,6 +56,42 @@ TEST(SupervisorNonce, NoDisarmingLeavesTheNonceAsItWas) {
   }
 
   EXPECT_EQ(repeated, 0);
+}
+
+// In flight the host repeats its wish, up to the step in which the vehicle is down.
+TEST(SupervisorNonce, WhatWasAskedForInFlightDoesNotArmAfterTheLanding) {
+  SupervisorBench bench;
+  ASSERT_TRUE(bench.take_off());
+  bench.request = ArmRequest::kArm;
+  bench.facts.battery = BattStatus::kEmpty;
+  bench.run(seconds(1));
+  ASSERT_EQ(bench.supervisor.state(), State::kLand);
+  bench.facts.battery = BattStatus::kGood;
+  bench.request.reset();
+  bench.facts.is_down = true;
+
+  bench.step();
+  ASSERT_EQ(bench.supervisor.state(), State::kDisarmed);
+
+  EXPECT_FALSE(bench.leaves(State::kDisarmed, seconds(1)).has_value());
+}
+
+TEST(SupervisorNonce, AfterADisarmingSetpointsMustHaveComeForHalfASecondAgain) {
+  SupervisorBench bench;
+  ASSERT_TRUE(bench.take_off());
+  bench.facts.is_on_ground = true;
+  for (int i = 0; i < 3; ++i) {
+    bench.send_arm(ArmRequest::kDisarm);
+  }
+  bench.step();
+  ASSERT_EQ(bench.supervisor.state(), State::kDisarmed);
+  bench.request = ArmRequest::kArm;
+
+  bench.run(milliseconds(490));
+  EXPECT_FALSE(bench.is_armed());
+  bench.run(milliseconds(30));
+
+  EXPECT_TRUE(bench.is_armed());
 }
 
 TEST(SupervisorNonce, FitsTheSixteenBitsThatItHasOnTheBusAndUsesAllOfThem) {

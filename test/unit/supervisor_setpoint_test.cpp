@@ -17,7 +17,7 @@ using test::SupervisorBench;
 struct Refusal {
   std::string name;
   std::function<void(SupervisorBench&, WireSetpoint&)> spoil;
-  AckResult answer;
+  AckResult answer{};
 };
 
 std::string name_of(const ::testing::TestParamInfo<Refusal>& info) {

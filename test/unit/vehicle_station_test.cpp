@@ -17,8 +17,8 @@ using test::messages_in;
 using test::StationPair;
 
 struct Rate {
-  std::uint16_t id;
-  std::size_t in_ten_seconds;
+  std::uint16_t id = 0;
+  std::size_t in_ten_seconds = 0;
 };
 
 std::size_t count_of(std::uint16_t id, const std::vector<PortFrame>& frames) {

@@ -121,7 +121,7 @@ TEST(SetpointSet, IsNotGivenWithoutAnyOneOfItsFrames) {
       const FrameSet frames = frames_of(number);
       for (std::size_t i = 0; i < frames.size(); ++i) {
         if (i != missing) {
-          receiver.take(frames[i], at_ms(10 * number));
+          receiver.take(frames[i], Time(number * std::chrono::milliseconds(10)));
         }
       }
     }
@@ -231,7 +231,9 @@ TEST(SetpointSet, IsWholeOrNotGivenWhateverTheBusDoes) {
       for (const Frame& frame : frames_of(number)) {
         for (std::uint64_t copies = rng.below(10) == 0 ? rng.below(3) : 1; copies > 0; --copies) {
           const auto delay_ms = rng.below(5) == 0 ? rng.below(30) : 0;
-          arrivals.emplace_back(at_ms(10 * number + static_cast<int>(delay_ms)), frame);
+          arrivals.emplace_back(
+              Time(number * std::chrono::milliseconds(10) + std::chrono::milliseconds(delay_ms)),
+              frame);
         }
       }
     }

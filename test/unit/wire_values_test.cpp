@@ -76,13 +76,14 @@ TEST(SetpointFrames, CarryValuesWithinHalfAStepOfTheirScale) {
 }
 
 TEST(SetpointFrames, CarryAYawOfAnyNumberOfTurns) {
-  for (double turns = -3.0; turns <= 3.0; turns += 0.5) {  // NOLINT(cert-flp30-c): exact
+  for (int half_turns = -6; half_turns <= 6; ++half_turns) {
     WireSetpoint wire;
-    wire.setpoint.yaw_rad = 0.3 + 2.0 * M_PI * turns;
+    wire.setpoint.yaw_rad = 0.3 + M_PI * half_turns;
 
     const double back_rad = sent_and_received(wire).setpoint.yaw_rad;
 
-    EXPECT_NEAR(std::remainder(back_rad - wire.setpoint.yaw_rad, 2.0 * M_PI), 0.0, 1e-4) << turns;
+    EXPECT_NEAR(std::remainder(back_rad - wire.setpoint.yaw_rad, 2.0 * M_PI), 0.0, 1e-4)
+        << half_turns;
   }
 }
 
