@@ -246,6 +246,25 @@ TEST(FlightControl, AnAstrayVehicleIsHeldAndFliesNoPlanAgain) {
   EXPECT_TRUE(flight.decision.setpoint->velocity_mps.isZero());
 }
 
+// It would be told to go back to where it lost the way, through what nobody has checked.
+TEST(FlightControl, AVehicleThatIsFarAstrayIsHeldWhereItIs) {
+  Flight flight;
+  flight.telemetry.is_following = true;
+  flight.fly_for(seconds(2));
+  flight.is_tracking = false;
+  flight.telemetry.is_following = false;
+  flight.tick();
+
+  flight.telemetry.state.position_m = Vector3d(3.0, -3.0, 1.0);
+  flight.tick();
+  EXPECT_TRUE(flight.holds_at(Vector3d(3.0, -3.0, 1.0)));
+  flight.telemetry.is_following = true;
+  flight.tick();
+
+  EXPECT_TRUE(flight.holds_at(Vector3d(3.0, -3.0, 1.0)));
+  EXPECT_EQ(flight.control.gate_violations(), 0U);
+}
+
 TEST(FlightControl, AHoldOfBeforeThePlanIsNotTakenUpAfterIt) {
   Flight flight;
   flight.has_plan = false;
@@ -335,7 +354,7 @@ TEST(FlightControl, AHoldPassesTheGate) {
   flight.telemetry.state.position_m = {7.0, 2.0, 1.5};
   flight.tick();
 
-  EXPECT_TRUE(flight.holds_at(kHome_m)) << "outside of the fence";
+  EXPECT_FALSE(flight.decision.setpoint.has_value()) << "outside of the fence";
   EXPECT_EQ(flight.control.gate_violations(), 1U);
 }
 

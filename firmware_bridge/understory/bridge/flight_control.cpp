@@ -49,6 +49,7 @@ FlightDecision FlightControl::decide(const TrajectoryFollower* plan,
     is_astray_ = is_astray_ || has_flown_plan_;
     hold_.reset();
     if (telemetry.is_valid) {
+      gate_.forget();
       decision.setpoint = gate_.pass(hold_at(telemetry.state), now);
     }
     return decision;
@@ -65,6 +66,8 @@ FlightDecision FlightControl::decide(const TrajectoryFollower* plan,
   if (hold_) {
     decision.setpoint = gate_.pass(*hold_, now);
   } else if (telemetry.is_valid) {
+    // Where it is, however far from where it was to be: else it would be sent back there.
+    gate_.forget();
     decision.setpoint = gate_.pass(hold_at(telemetry.state), now);
     hold_ = decision.setpoint;
   }

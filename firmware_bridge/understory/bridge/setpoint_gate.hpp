@@ -44,6 +44,9 @@ class SetpointGate {
   // `setpoint` itself, or a hold; nothing where no setpoint was good yet.
   [[nodiscard]] std::optional<Setpoint> pass(const Setpoint& setpoint, Time now);
 
+  // What was sent does not tell any more where the vehicle is: the next one is judged without it.
+  void forget() { last_.reset(); }
+
   [[nodiscard]] std::uint64_t violations() const { return violations_; }
 
  private:
