@@ -14,7 +14,7 @@ from bench import HOST_BUS, MEMORY, FlightTest, summary_of
 from can_tools import Frame, Port
 
 HIL_OPTIONS = ["--wire"]
-BURST, BURST_PERIOD_S = 25, 0.05  # more than the queue holds, which is 10
+BURST, BURST_PERIOD_S = 60, 0.05  # more than the queue holds, which is 10
 # canbusload counts bits of the frames in whole per cent, over a second.
 LOAD_TOLERANCE = 0.03
 

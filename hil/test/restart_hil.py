@@ -30,7 +30,7 @@ class AVehicle(FlightTest):
 
         died_s = vehicle.kill()
         heard_s = min(self.bus.of(name)[-1].stamp_s for name in ("ODO_RATE", "VEH_STATE"))
-        lost = host.wait_for_line("FAULT .*fallen silent")
+        lost = host.wait_for_line("FAULT ARMED .*fallen silent")
         time.sleep(0.2)
         last = self.bus.of("SP_COMMIT")[-1]
         self.start_vehicle()
@@ -76,7 +76,7 @@ class AVehicle(FlightTest):
         before = self.sessions()
 
         vehicle.tell("freeze")
-        host.wait_for_line("FAULT .*fallen silent")
+        host.wait_for_line("FAULT ARMED .*fallen silent")
         time.sleep(LONG_S - LINK_LOST_S)
         back_s = time.time()
         vehicle.tell("resume")

@@ -103,7 +103,7 @@ class SilenceOfTheVehicle(WireTest):
         before = self.sessions()
 
         silent_s = self.wire.become(to="host", drop=ODOMETRY)
-        host.wait_for_line("FAULT .*fallen silent")
+        host.wait_for_line("FAULT ARMED .*fallen silent")
         time.sleep(0.3)
 
         begin_s = self.bus.of("ODO_RATE")[-1].stamp_s
@@ -136,7 +136,7 @@ class SilenceOfTheVehicle(WireTest):
         before = self.sessions()
 
         self.wire.become(to="host", drop=["VEH_STATE"])
-        host.wait_for_line("FAULT .*fallen silent")
+        host.wait_for_line("FAULT ARMED .*fallen silent")
         time.sleep(0.2)
 
         begin_s = self.bus.of("VEH_STATE")[-1].stamp_s
