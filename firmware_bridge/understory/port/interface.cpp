@@ -28,7 +28,7 @@ using Bytes = std::array<unsigned char, kAnswerBytes>;
 
 template <class T>
 T read_as(const unsigned char* bytes) {
-  T value;
+  T value{};
   std::memcpy(&value, bytes, sizeof(value));
   return value;
 }
