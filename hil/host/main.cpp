@@ -238,11 +238,7 @@ void add_options(CLI::App& app, Options& options) {
   app.add_option("--log", options.log_file, "every frame, as candump -l writes it");
 }
 
-}  // namespace
-}  // namespace understory
-
-int main(int count, char** words) {
-  using namespace understory;
+int run_main(int count, char** words) {
   CLI::App app("Flies a vehicle on a CAN bus in circles: the bridge without ROS, for the bench.",
                "understory_host");
   app.footer("Ctrl-C lands the vehicle, a second one ends at once. More: docs/hil.md.");
@@ -266,5 +262,16 @@ int main(int count, char** words) {
   } catch (const std::exception& error) {
     fmt::print(stderr, "understory_host: {}\n", error.what());
     return 2;
+  }
+}
+
+}  // namespace
+}  // namespace understory
+
+int main(int count, char** words) {
+  try {
+    return understory::run_main(count, words);
+  } catch (...) {
+    return 2;  // out of memory while saying what was wrong
   }
 }

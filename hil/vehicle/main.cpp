@@ -219,11 +219,7 @@ void add_options(CLI::App& app, Options& options) {
       ->allow_extra_args(false);
 }
 
-}  // namespace
-}  // namespace understory
-
-int main(int count, char** words) {
-  using namespace understory;
+int run_main(int count, char** words) {
   CLI::App app("A vehicle on a CAN bus, for tests: autopilot, four ESCs, battery, rigid body.",
                "understory_vehicle");
   app.footer(
@@ -248,5 +244,16 @@ int main(int count, char** words) {
   } catch (const std::exception& error) {
     fmt::print(stderr, "understory_vehicle: {}\n", error.what());
     return 2;
+  }
+}
+
+}  // namespace
+}  // namespace understory
+
+int main(int count, char** words) {
+  try {
+    return understory::run_main(count, words);
+  } catch (...) {
+    return 2;  // out of memory while saying what was wrong
   }
 }
