@@ -217,7 +217,7 @@ TEST(InProcessAutopilot, AShortStallIsCaughtUpWith) {
   Flown prompt;
   stalled.fly_for(seconds(4));
   prompt.fly_for(seconds(4));
-  const Time later = stalled.now + milliseconds(100);
+  const Time later = stalled.now + milliseconds(60);
   for (; prompt.now < later; prompt.now += kTick) {
     static_cast<void>(prompt.pilot->receive(prompt.now));
   }
