@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Any, Callable, Dict, Iterator, List, NamedTuple, Optional, Sequence, Tuple
 
 from can_tools import FRAME, ROOT, STAMPS_NS, must_run, wait_until
-from machine import Machine, tried_again
+from machine import Machine, Never, tried_again
 
 sys.path.append(str(ROOT / "firmware_bridge" / "can"))
 import dbc  # noqa: E402  pylint: disable=wrong-import-position
@@ -45,6 +45,7 @@ FLYING = ("ARMED", "HOLD", "LAND")
 # 20 ms, and the machine is shared.
 STATE_PERIOD_S = 0.02
 SCHEDULING_S = 0.03
+STAMPS_DIFFER_S = 0.001
 
 
 class Said(NamedTuple):
@@ -123,7 +124,8 @@ class Listener:
         filters = [struct.pack("=II", BY_NAME[name].id, FILTER_MASK) for name in names]
         self._socket.setsockopt(socket.SOL_CAN_RAW, socket.CAN_RAW_FILTER, b"".join(filters))
         # So that the thread notices when this is closed.
-        self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVTIMEO, struct.pack("ll", 0, 200_000))
+        patience = struct.pack("ll", 0, 200_000)
+        self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVTIMEO, patience)
         self._socket.bind((interface,))
         self._raw: Dict[int, List[Tuple[float, bytes]]] = {}
         self._decoded: Dict[str, Tuple[int, List[Said]]] = {}
@@ -357,15 +359,27 @@ class FlightTest(unittest.TestCase):
         )
         return vehicle, host
 
-    def assert_after(self, limit_s: float, begin_s: float, end: Said, what: str = "") -> None:
-        """`end` came when it was due: never early, and late only by what the machine explains."""
+    def assert_never(self, is_so: Any, what: str) -> None:
+        """However slow the machine is."""
+        if is_so:
+            raise Never(f"{what}: {is_so}")
+
+    def assert_never_armed(self, since_s: float = 0.0) -> None:
+        states = [state for state, _ in self.bus.states(since_s)]
+        self.assert_never("ARMED" in states, "armed all the same")
+
+    def assert_after(
+        self, limit_s: float, begin_s: float, end: Said, what: str, early_s: float = 0.0
+    ) -> None:
+        """`end` came when it was due: never early, and late only by what the machine explains.
+        `early_s`: the vehicle's clock began so much before `begin_s` at most."""
         took_s = end.stamp_s - begin_s
         still = self.bus.standstills() + self.machine.gaps()
         near = [e - b for b, e in still if e > begin_s and b < end.stamp_s]
         late_s = STATE_PERIOD_S + SCHEDULING_S + sum(near)
-        text = f"{what or end.name} after {1e3 * took_s:.1f} ms"
+        text = f"{what} after {1e3 * took_s:.1f} ms"
         print(f"    {text}, due after {1e3 * limit_s:.0f} ms")
-        self.assertGreater(took_s, limit_s - 0.001, text)
+        self.assert_never(took_s < limit_s - early_s - STAMPS_DIFFER_S, f"too early: {text}")
         self.assertLess(took_s, limit_s + late_s, f"{text}, allowed {1e3 * late_s:.0f} ms late")
 
     def assert_lands(self, patience_s: float = 15.0, since_s: float = 0.0) -> None:

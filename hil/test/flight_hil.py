@@ -37,7 +37,7 @@ class AFlight(FlightTest):
         """Of sets that wait together because the vehicle was late only the newest is answered."""
         commits = self.bus.of("SP_COMMIT")
         answers = self.bus.of("SP_ACK")
-        acks = {(said["AckSeq"], int(said.stamp_s) - later_s) for said in answers for later_s in (0, 1)}
+        acks = {(said["AckSeq"], int(said.stamp_s) - late) for said in answers for late in (0, 1)}
         unanswered = [s for s in commits if (s["SpSeq"], int(s.stamp_s)) not in acks]
         results = {said["AckResult"] for said in answers}
         print(f"    {len(commits)} sets, {len(unanswered)} without an answer, {results}")

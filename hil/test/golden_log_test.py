@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Two flights that were recorded on a real bus: what the log tool must say of them for ever.
 
-flight.log: armed, flown and landed by understory_host, by its own --log. host_dies.log: its host was
-killed in flight, by candump. Both at 50 Hz. A change of the DBC needs them recorded anew.
+flight.log: armed, flown and landed by understory_host, by its own --log. host_dies.log: its host
+was killed in flight, by candump. Both at 50 Hz. A change of the DBC needs them recorded anew.
 """
 
 import json

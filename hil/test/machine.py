@@ -21,6 +21,7 @@ HIGHEST_PRIORITY = 99  # over all that is tested: only the machine itself can ma
 NAP_S = 0.01
 LATE_S = 0.004  # of a wake-up
 GAP_S = 0.03  # one alone is trouble
+HOPELESS_S = 0.2
 MOST_LATE = 0.01  # of the time
 LEAST_IDLE = 0.05  # of the processor's time
 ATTEMPTS = 3
@@ -74,21 +75,35 @@ class Machine:
         lines = self._text.decode().split("\n")[:-1]
         return [(float(line.split()[0]), float(line.split()[1])) for line in lines]
 
+    def _idle(self) -> float:
+        """Part of the time, 0 to 1."""
+        idle, everything = (now - then for now, then in zip(self._times(), self._begin))
+        return idle / max(1, everything)
+
+    def is_hopeless(self) -> bool:
+        """It stood still for longer than a vehicle waits, or had nothing left to give."""
+        longest_s = max((end - begin for begin, end in self.gaps()), default=0.0)
+        return longest_s > HOPELESS_S or self._idle() < LEAST_IDLE
+
     def trouble(self) -> str:
         """Empty: it was as fast as one may ask for."""
         gaps = self.gaps()
-        idle, everything = (now - then for now, then in zip(self._times(), self._begin))
         total_s, longest_s = (f([end - begin for begin, end in gaps] or [0.0]) for f in (sum, max))
         if longest_s > GAP_S or total_s > MOST_LATE * (time.time() - self._began_s):
-            return f"the machine stood still {len(gaps)} times, for {1e3 * longest_s:.0f} ms at most"
-        if idle < LEAST_IDLE * everything:
-            return f"the machine had too little time: {100 * idle / max(1, everything):.0f} % idle"
+            text = f"the machine stood still {len(gaps)} times"
+            return f"{text}, for {1e3 * longest_s:.0f} ms at most"
+        if self._idle() < LEAST_IDLE:
+            return f"the machine had too little time: {100 * self._idle():.0f} % idle"
         return ""
 
 
+class Never(AssertionError):
+    """What no machine is slow enough for: too early, armed, flown, killed without a reason."""
+
+
 def tried_again(test: Callable[[Any], None]) -> Callable[[Any], None]:
-    """A failure counts if the machine was fast enough meanwhile; else the test is done again, and
-    in the end skipped, which is no success either."""
+    """A failure counts if the machine was fast enough meanwhile; else the test is done again. The
+    last one counts too, but where nothing could have been tested: that is skipped."""
 
     @functools.wraps(test)
     def tried(self: Any) -> None:
@@ -96,21 +111,24 @@ def tried_again(test: Callable[[Any], None]) -> Callable[[Any], None]:
             machine = self.machine = Machine()
             signal.alarm(signal.alarm(0) and ATTEMPT_PATIENCE_S)  # the runner's, for each anew
             try:
+                if attempt > 1:
+                    self.setUp()
                 test(self)
                 return
+            except Never:
+                raise
             except (AssertionError, LookupError, subprocess.TimeoutExpired) as error:
                 trouble = machine.trouble()
-                if not trouble:
-                    raise
                 reason = str(error).split("\n", maxsplit=1)[0]
-                print(f"    attempt {attempt}: {trouble}; {reason}", flush=True)
-                self.show_programs()
-                if attempt == ATTEMPTS:
+                print(f"    attempt {attempt}: {trouble or 'a calm machine'}; {reason}", flush=True)
+                if attempt == ATTEMPTS and machine.is_hopeless():
                     raise unittest.SkipTest(f"{trouble}; {reason}") from error
+                if not trouble or attempt == ATTEMPTS:
+                    raise
+                self.show_programs()
             finally:
                 machine.close()
             self.doCleanups()
-            self.setUp()
 
     return tried
 

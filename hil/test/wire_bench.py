@@ -18,7 +18,7 @@ class Wire(Program):
     def __init__(self, seed: int) -> None:
         script = Path(__file__).resolve().parent / "faulty_wire.py"
         super().__init__(sys.executable, "-B", script, HOST_BUS, VEHICLE_BUS, seed)
-        self.wait_for_line("{")
+        self.wait_for_line("{", 30.0)
 
     def become(self, **faults: Any) -> float:
         """From now on. Returns since when."""

@@ -67,8 +67,10 @@ def report(summary: Dict[str, Any], share: float) -> None:
     lost = {name: row["lost"] for name, row in messages.items() if row["lost"]}
     torn = {name: sets["torn"] for name, sets in summary["sets"].items()}
     print(f"lost by the counters: {lost or 'nothing'}; torn sets: {torn}")
-    print(f"setpoints without an answer: {summary['unanswered']}; both ends counted: {summary['link']}")
-    print(f"CPU of the host: {100 * share:.1f} % of one processor")
+    print(f"setpoints without an answer: {summary['unanswered']}")
+    print(f"both ends counted: {summary['link']}")
+    print(f"CPU of the host: {100 * share:.1f} % of one processor, as the kernel's tick", end=" ")
+    print(f"of {1e3 * TICK_S:.0f} ms counts it, which may be far off")
 
 
 def main() -> None:
@@ -83,7 +85,7 @@ def main() -> None:
         trouble, gaps = machine.trouble(), [end - begin for begin, end in machine.gaps()]
         machine.close()
         report(summary_of(log_path), share)
-    print(f"the machine: woke late {len(gaps)} times, {sum(gaps):.3f} s in all; {trouble or 'calm'}")
+    print(f"the machine woke late {len(gaps)} times, {sum(gaps):.3f} s in all; {trouble or 'calm'}")
 
 
 if __name__ == "__main__":
