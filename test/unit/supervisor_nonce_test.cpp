@@ -76,6 +76,27 @@ TEST(SupervisorNonce, WhatWasAskedForInFlightDoesNotArmAfterTheLanding) {
   EXPECT_FALSE(bench.leaves(State::kDisarmed, seconds(1)).has_value());
 }
 
+// Its frames are on the way when the flight ends; why it ended must stay readable all the same.
+TEST(SupervisorNonce, TheTokenOfTheFlightThatHasJustEndedIsNotAWishForAnother) {
+  SupervisorBench bench;
+  bench.token = arm_token(bench.nonce(), bench.session);
+  bench.request = ArmRequest::kArm;
+  bench.run(seconds(1));
+  ASSERT_TRUE(bench.is_armed());
+  bench.facts.is_on_ground = false;
+  bench.facts.battery = BattStatus::kEmpty;
+  bench.run(milliseconds(100));
+  ASSERT_EQ(bench.supervisor.state(), State::kLand);
+  bench.facts.is_down = true;
+
+  bench.run(milliseconds(400));
+
+  EXPECT_EQ(bench.supervisor.state(), State::kDisarmed);
+  EXPECT_EQ(bench.supervisor.reason(), StateReason::kLanded);
+  bench.run(milliseconds(300));
+  EXPECT_EQ(bench.supervisor.state(), State::kArming) << "half a second is time enough";
+}
+
 TEST(SupervisorNonce, AfterADisarmingSetpointsMustHaveComeForHalfASecondAgain) {
   SupervisorBench bench;
   ASSERT_TRUE(bench.take_off());

@@ -25,10 +25,6 @@ bool is_due(std::optional<Time>& last, double period_s, Time now) {
   return true;
 }
 
-bool is_flying(State state) {
-  return state == State::kArmed || state == State::kHold || state == State::kLand;
-}
-
 }  // namespace
 
 const char* to_string(LinkProblem problem) {

@@ -56,6 +56,10 @@ struct VehicleFacts {
   bool is_down = false;      // the landing has ended
 };
 
+[[nodiscard]] constexpr bool is_flying(State state) {
+  return state == State::kArmed || state == State::kHold || state == State::kLand;
+}
+
 // What ARM_CMD must carry.
 [[nodiscard]] std::uint32_t arm_token(std::uint32_t nonce, std::uint32_t session);
 
@@ -99,6 +103,8 @@ class Supervisor {
   StateReason reason_ = StateReason::kPowerOn;
   VehicleFacts facts_;
   std::uint32_t nonce_ = 0;
+  std::uint32_t spent_nonce_ = 0;  // of the flight that ended then
+  std::optional<Time> flight_ended_;
   std::uint32_t arm_seq_ = 0;
 
   std::optional<Time> last_heartbeat_;
