@@ -17,7 +17,6 @@ quiet = io.StringIO()  # it talks about formats it does not know
 with contextlib.redirect_stdout(quiet), contextlib.redirect_stderr(quiet):
     import canmatrix.formats
 
-FIRST_DATA_ID, DATA_ID_STEP = 0x11, 7
 CRC_POLYNOMIAL, CRC_INITIAL, CRC_FINAL = 0x2F, 0xFF, 0xFF
 UNITS = {
     "m": "m",
@@ -78,11 +77,11 @@ class Signal:
 
 
 class Message:
-    def __init__(self, frame: "canmatrix.Frame", position: int):
+    def __init__(self, frame: "canmatrix.Frame"):
         self.dbc_name = frame.name
         self.name = camel(frame.name)
         self.id = frame.arbitration_id.id
-        self.data_id = FIRST_DATA_ID + DATA_ID_STEP * position
+        self.data_id = int(frame.attribute("DataId", default=0))
         self.sender = frame.transmitters[0]
         self.period_ms = frame.cycle_time
         self.comment = frame.comment or ""
@@ -121,13 +120,14 @@ def read_messages(path: Path) -> Tuple[str, List[Message]]:
         matrix = canmatrix.formats.loadp_flat(str(path))
     except OSError as error:
         raise LayoutError(f"{path}: {error.strerror}") from error
-    messages = [Message(frame, position) for position, frame in enumerate(matrix.frames)]
+    messages = [Message(frame) for frame in matrix.frames]
     names = [signal.dbc_name for message in messages for signal in message.signals]
     twice = sorted({name for name in names if names.count(name) > 1})
     if not messages or twice:
         raise LayoutError(f"{path}: no messages, or signals named twice: {' '.join(twice)}")
-    if max(message.data_id for message in messages) > 0xFF:
-        raise LayoutError(f"{path}: more messages than data identifiers")
+    data_ids = [message.data_id for message in messages]
+    if len(set(data_ids)) < len(data_ids) or min(data_ids) < 1 or max(data_ids) > 0xFF:
+        raise LayoutError(f"{path}: a message lacks a DataId (1 to 255) of its own")
     return version_of(path), messages
 
 

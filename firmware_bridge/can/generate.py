@@ -227,9 +227,10 @@ def docs_text(version, messages):
         "# The CAN protocol\n",
         "Generated from `firmware_bridge/can/understory.dbc` by `firmware_bridge/can/generate.py docs`.\n",
         "Classic CAN, 11-bit identifiers, 8 bytes, little endian. Byte 0 is the CRC (CRC8H2F: polynomial",
-        "0x2F, initial and final XOR 0xFF) over bytes 1 to 7 and then the message's data identifier; the low",
-        "half of byte 1 counts 0 to 15 (AUTOSAR E2E profile 2). The code that means \"not available\" is",
-        "all ones (unsigned) or the most negative one (signed). The example of each message is a test.\n",
+        "0x2F, initial and final XOR 0xFF) over bytes 1 to 7 and then the message's data identifier (in the",
+        "DBC its attribute DataId); the low half of byte 1 counts 0 to 15 (AUTOSAR E2E profile 2). The code",
+        "that means \"not available\" is all ones (unsigned) or the most negative one (signed). The example of",
+        "each message is a test.\n",
         f"Version {version}, hash 0x{protocol_hash(messages):04X} (of HOST_HB and VEH_HB).\n",
     ]
     for message, counter, raws, data in examples(messages):
