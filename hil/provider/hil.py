@@ -14,6 +14,7 @@ from typing import Dict, List, NoReturn, Optional, Protocol, Sequence, Tuple
 
 from job import FAILED_STATUS, WIRE_BITRATE, HilError, Job
 from native import Native
+from qemu import Qemu
 from relay import Interrupted, is_terminal
 from uml import Uml
 
@@ -29,7 +30,7 @@ class Provider(Protocol):
 
 
 # In the order in which they are tried: the quickest first.
-PROVIDERS: Dict[str, Provider] = {"native": Native(), "uml": Uml()}
+PROVIDERS: Dict[str, Provider] = {"native": Native(), "uml": Uml(), "qemu": Qemu()}
 
 
 class Parser(argparse.ArgumentParser):

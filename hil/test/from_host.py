@@ -68,7 +68,7 @@ class FromHost(unittest.TestCase):
                 words = path.read_bytes()
             except OSError:
                 continue
-            if f"uml_dir={self.temporary}".encode() in words:
+            if f"{self.temporary}/understory-hil-".encode() in words:
                 found.append(words)
         return found
 
@@ -231,6 +231,32 @@ class TwoAtOnce(FromHost):
 
         self.assertIn(b" 111#", outputs[0])
         self.assertIn(b" 222#", outputs[1])
+
+
+class TheSlowProvider(FromHost):
+    """QEMU without KVM: half a minute for each boot, so few of them."""
+
+    def test_has_a_bus_and_passes_everything_through(self):
+        data = ALL_BYTES + random.Random(3).randbytes(LOTS // 64)
+        script = (
+            'ip -details link show vcan0 >"$FOLDER/link";'
+            'candump -L -n 1 vcan0 >"$FOLDER/log" & sleep 2; cansend vcan0 111#AABB; wait; cat; exit 3'
+        )
+
+        outcome = self.run_hil("--provider", "qemu", "--", "sh", "-c", script, input=data)
+
+        self.assertEqual((outcome.returncode, outcome.stderr), (3, b""))
+        self.assertTrue(outcome.stdout == data)
+        self.assertIn("vcan numtxqueues", (self.folder / "link").read_text(encoding="ascii"))
+        self.assertIn(" vcan0 111#AABB", (self.folder / "log").read_text(encoding="ascii"))
+
+    def test_ends_cleanly_when_it_is_interrupted(self):
+        process = self.start("--provider", "qemu", "--", "bash", "-c", TRAP)
+
+        process.send_signal(signal.SIGINT)
+
+        self.assertEqual(process.wait(PATIENCE_S), 7)
+        self.assertEqual((self.folder / "file").read_text(encoding="ascii"), "written\n")
 
 
 class OnATerminal(FromHost):
