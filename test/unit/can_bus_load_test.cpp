@@ -72,7 +72,9 @@ TEST(WireLength, IsThatOfAFrameBuiltBitByBit) {
     const std::uint64_t kind = rng.below(3);
     for (std::uint8_t& byte : frame.data) {
       const auto few = static_cast<std::uint8_t>(rng.below(256) & rng.below(256) & rng.below(256));
-      byte = kind == 0 ? few : static_cast<std::uint8_t>(kind == 1 ? ~few : rng.below(256));
+      const auto many = static_cast<std::uint8_t>(0xFFU - few);
+      const auto any = static_cast<std::uint8_t>(rng.below(256));
+      byte = kind == 0 ? few : (kind == 1 ? many : any);
     }
     ASSERT_EQ(static_cast<std::size_t>(wire_bits(frame)), slow_wire_bits(frame)) << i;
     ASSERT_LE(wire_bits(frame) + kInterframeBits, worst_case_bits(frame.length)) << i;
@@ -129,12 +131,11 @@ std::vector<PeriodicMessage> messages_of(Mode mode) {
   std::vector<PeriodicMessage> messages;
   for (const auto& [id, fastest] : dbc_periods()) {
     Duration period = fastest;
-    if (id == Kill::kId) {
+    const bool is_halved = mode == Mode::kNormal && fastest == milliseconds(5);
+    if (id == Kill::kId || is_halved) {
       period = milliseconds(10);
     } else if (id == EscCmd::kId) {
       period = microseconds(2500);
-    } else if (mode == Mode::kNormal && fastest == milliseconds(5)) {
-      period = milliseconds(10);
     }
     if (id != EscCmd::kId || mode == Mode::kDirect) {
       messages.push_back({id, period, kJitter});

@@ -108,7 +108,7 @@ TEST(CanNode, SendsAfterTheBatchAndOnlyWhatItMay) {
 
 TEST(CanNode, HandlesMoreThanOneBatchInOnePoll) {
   FakeBus bus;
-  for (int i = 0; i < 200; ++i) {
+  for (std::int64_t i = 0; i < 200; ++i) {
     bus.arrive(0x200, at_ms(10 * i));
   }
 

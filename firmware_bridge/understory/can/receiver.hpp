@@ -55,7 +55,8 @@ class CounterCheck {
       in_row_ = 0;
       return Verdict::kWrongSequence;
     }
-    if (in_row_ < kResyncFrames && ++in_row_ < kResyncFrames) {
+    in_row_ = std::min(in_row_ + 1, kResyncFrames);
+    if (in_row_ < kResyncFrames) {
       ++counters_.wrong_sequence;
       return Verdict::kWrongSequence;
     }

@@ -37,6 +37,7 @@ void append_hex(unsigned value, unsigned digits, std::string& text) {
 template <class Number>
 bool parse(std::string_view text, int base, Number& number) {
   const char* const end = text.data() + text.size();
+  // NOLINTNEXTLINE(bugprone-suspicious-stringview-data-usage): from_chars takes both ends
   const auto [stop, error] = std::from_chars(text.data(), end, number, base);
   return !text.empty() && error == std::errc() && stop == end;
 }

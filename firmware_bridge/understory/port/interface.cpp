@@ -125,8 +125,9 @@ InterfaceWatch::InterfaceWatch(std::string name)
 void InterfaceWatch::forget_events() {
   Bytes bytes;
   // Also an error (too many events to keep) only says that something has changed.
-  while (::recv(events_.get(), bytes.data(), bytes.size(), MSG_DONTWAIT) > 0 || errno == ENOBUFS) {
-    errno = 0;
+  ssize_t received = 1;
+  while (received > 0 || (received < 0 && errno == ENOBUFS)) {
+    received = ::recv(events_.get(), bytes.data(), bytes.size(), MSG_DONTWAIT);
   }
 }
 

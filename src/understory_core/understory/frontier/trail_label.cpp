@@ -115,6 +115,7 @@ Surroundings surroundings_of(const MapSnapshot& snapshot,
     return {};
   }
   std::vector<Vector2d> columns;
+  columns.reserve(cluster.voxels.size());
   for (const VoxelIndex& voxel : cluster.voxels) {
     columns.push_back(voxel.head<2>().cast<double>());
   }

@@ -145,6 +145,7 @@ std::vector<Viewpoint> ViewpointSampler::sample(const ClearanceMap& map,
                                                 const Cluster& cluster) const {
   std::vector<Vector3d> sampled;
   const std::size_t count = std::min(cluster.voxels.size(), kSampledVoxels);
+  sampled.reserve(count);
   for (std::size_t i = 0; i < count; ++i) {
     sampled.push_back(map.geometry().center_of(cluster.voxels[i * cluster.voxels.size() / count]));
   }
