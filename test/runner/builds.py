@@ -20,7 +20,11 @@ SANITIZED = [
     "-DUNDERSTORY_ASSERTS=ON",
 ]
 # Clones and build folders share what is compiled alike.
-CCACHE = {"CCACHE_BASEDIR": str(ROOT), "CCACHE_NOHASHDIR": "1"}
+CCACHE = {
+    "CCACHE_BASEDIR": str(ROOT),
+    "CCACHE_NOHASHDIR": "1",
+    "CCACHE_SLOPPINESS": "pch_defines,time_macros",
+}
 
 
 def build(folder_name, options, targets):

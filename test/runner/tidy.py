@@ -12,6 +12,7 @@ import hashlib
 import json
 import os
 import pathlib
+import re
 import shlex
 import subprocess
 import time
@@ -22,6 +23,8 @@ from results import SuiteResult
 COMMANDS = ROOT / "build-test" / "tidy"  # compile_commands.json of all folders in one
 CACHE = pathlib.Path(os.environ.get("UNDERSTORY_TIDY_CACHE", ROOT / "build" / "tidy-cache"))
 CLANG_TIDY = "clang-tidy-22"  # the first one that leaves out system headers
+# Headers that GCC has precompiled: clang cannot read them, and a file must include what it needs.
+GCC_HEADERS = re.compile(r"-fpch-preprocess|-Winvalid-pch -include \S+/cmake_pch\.hxx")
 # GCC's own warnings; what Google Benchmark's macros use.
 LET_PASS = ["-Wno-unknown-warning-option", "-Wno-c2y-extensions"]
 
@@ -52,7 +55,7 @@ def _object_file(entry):
 def _key(entry, files, version_and_rules):
     digest = hashlib.sha256(version_and_rules.encode())
     digest.update(entry["command"].replace(str(ROOT), "").encode())
-    for path in sorted(set(files)):
+    for path in sorted(name for name in set(files) if not name.endswith(".gch")):
         digest.update(f"{path.replace(str(ROOT), '')} {_content_hash(path)}\n".encode())
     return digest.hexdigest()
 
@@ -91,6 +94,7 @@ def entries_of(folders):
             is_ours = path.startswith(f"{ROOT}/") and not path.startswith(generated)
             if is_ours and path not in found:
                 command = entry["command"].replace(entry["file"], path)
+                command = GCC_HEADERS.sub("", command)
                 found[path] = {**entry, "file": path, "command": command, "folder": folder}
     return found
 

@@ -23,6 +23,39 @@ option(UNDERSTORY_WERROR "Treat warnings as errors" OFF)
 option(UNDERSTORY_ASSERTS "Keep assertions on in Release builds" OFF)
 set(UNDERSTORY_SANITIZE "" CACHE STRING "Sanitizers, e.g. address,undefined")
 
+# Reading the headers of others takes most of the time that a file takes.
+option(UNDERSTORY_PCH "Precompile headers of other libraries" ON)
+set(UNDERSTORY_COMMON_HEADERS
+  <Eigen/Core> <Eigen/Geometry> <algorithm> <array> <chrono> <cmath> <functional> <limits> <map>
+  <memory> <optional> <string> <string_view> <unordered_map> <vector>)
+
+# GCC 12 has false alarms about its own strings, which it keeps to itself only as long as it reads
+# them from a system header; the first option is for ccache.
+set(UNDERSTORY_PCH_OPTIONS
+  $<$<CXX_COMPILER_ID:GNU>:-fpch-preprocess$<SEMICOLON>-Wno-array-bounds$<SEMICOLON>-Wno-restrict$<SEMICOLON>-Wno-stringop-overflow$<SEMICOLON>-Wno-stringop-overread>)
+
+# Headers as <name>, for all files of a target.
+function(understory_precompile target)
+  if(UNDERSTORY_PCH)
+    target_precompile_headers(${target} PRIVATE ${ARGN})
+    target_compile_options(${target} PRIVATE ${UNDERSTORY_PCH_OPTIONS})
+  endif()
+endfunction()
+
+# Those of another target with the same options and no definitions of its own; none where that is
+# not part of the build.
+function(understory_precompile_as target other)
+  if(UNDERSTORY_PCH AND TARGET ${other})
+    target_precompile_headers(${target} REUSE_FROM ${other})
+    get_target_property(type ${target} TYPE)
+    if(type STREQUAL EXECUTABLE)  # made with -fPIE, which does not go with headers of a library
+      set_target_properties(${target} PROPERTIES POSITION_INDEPENDENT_CODE OFF)
+      target_compile_options(${target} PRIVATE -fPIC)
+    endif()
+    target_compile_options(${target} PRIVATE ${UNDERSTORY_PCH_OPTIONS})
+  endif()
+endfunction()
+
 function(understory_compile_options target)
   target_compile_options(${target} PRIVATE
     -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wsign-conversion -Wold-style-cast
