@@ -6,7 +6,8 @@
 The two cannot agree exactly: onboard, exposures fall on the 100 Hz grid of the odometry, decisions
 take time, and threads run in another order each time, so targets differ after a few seconds. One
 onboard flight scatters by several percent; where the first one is outside, a second one joins the
-mean.
+mean. A machine that stands still for long ends a flight safely before its time; such a one does not
+count, but only so many in a row are borne.
 """
 
 import json
@@ -22,6 +23,8 @@ import rostest
 
 SCENARIO = "small"
 TOLERANCE = 0.15
+ATTEMPTS = 3
+STALLED = "tracking_lost"
 ROOT = Path(__file__).resolve().parents[2]
 
 
@@ -46,11 +49,15 @@ class Sameness(unittest.TestCase):
         self.folder = Path(tempfile.mkdtemp(prefix="understory_sameness_"))
         self.addCleanup(shutil.rmtree, self.folder, True)
 
-    def completed(self, command, folder):
-        status, result = result_of([*command], folder)
+    def completed(self, command, folder, attempts=1):
+        for attempt in range(1, attempts + 1):
+            status, result = result_of([*command], folder)
+            self.assertEqual(result["collisions"], 0)
+            if result["stop_reason"] != STALLED:
+                break
+            print(f"attempt {attempt}: {STALLED}", flush=True)
         self.assertEqual(status, 0, result["stop_reason"])
         self.assertTrue(result["completed"])
-        self.assertEqual(result["collisions"], 0)
         self.assertGreaterEqual(result["coverage"], 0.99)
         return result["completion_time_s"]
 
@@ -65,7 +72,8 @@ class Sameness(unittest.TestCase):
         folder = self.folder / f"onboard_{number}"
         folder.mkdir()
         command = [program("understory_nodelets", "onboard"), "--scenario", SCENARIO]
-        return self.completed(command + ["--result-folder", str(folder)], folder)
+        command += ["--result-folder", str(folder)]
+        return self.completed(command, folder, ATTEMPTS)
 
     def test_completion_times_agree(self):
         lockstep_s = self.in_lockstep()
