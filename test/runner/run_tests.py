@@ -6,7 +6,6 @@ Called by `understory test` once all packages are installed.
 """
 
 import argparse
-import concurrent.futures
 import pathlib
 import subprocess
 import sys
@@ -153,16 +152,6 @@ def guarded(name, suite, *arguments):
     return found if isinstance(found, list) else [found]
 
 
-def run_tidy_and_ros(folder):
-    """Side by side: the onboard flights wait for the clock most of the time, clang-tidy (which is
-    nice to others) for nobody."""
-    built_workspace()  # both need it
-    with concurrent.futures.ThreadPoolExecutor(1) as pool:
-        tidy = pool.submit(guarded, "clang-tidy", run_tidy, folder)
-        ros = guarded("ros", run_ros_tests)
-        return tidy.result() + ros
-
-
 def run_hil_alone():
     folder, built = run_build(False)
     return [built] + (guarded("hil", run_hil_tests, folder) if folder is not None else [])
@@ -177,7 +166,8 @@ def run_all(quick):
         return results
     if folder is not None:
         results += guarded("parameters", check_parameters, folder)
-        results += run_tidy_and_ros(folder)
+        results += guarded("ros", run_ros_tests)
+        results += guarded("clang-tidy", run_tidy, folder)
     results += guarded("hil", run_hil_tests, folder)
     results += guarded("unit-asan", run_sanitized)
     results += guarded("threads-tsan", run_thread_sanitized)

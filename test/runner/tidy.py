@@ -63,7 +63,7 @@ def _key(entry, files, version_and_rules):
 def _look_at(entry, key):
     """Runs clang-tidy over one file; returns what it says, empty if clean."""
     outcome = subprocess.run(
-        ["nice", "-n", "19", CLANG_TIDY, "-p", COMMANDS, "--quiet"]
+        [CLANG_TIDY, "-p", COMMANDS, "--quiet"]
         + [*(f"--extra-arg={option}" for option in LET_PASS), entry["file"]],
         cwd=ROOT,
         stdin=subprocess.DEVNULL,
