@@ -25,8 +25,15 @@ CACHE = pathlib.Path(os.environ.get("UNDERSTORY_TIDY_CACHE", ROOT / "build" / "t
 CLANG_TIDY = "clang-tidy-22"  # the first one that leaves out system headers
 # Headers that GCC has precompiled: clang cannot read them, and a file must include what it needs.
 GCC_HEADERS = re.compile(r"-fpch-preprocess|-Winvalid-pch -include \S+/cmake_pch\.hxx")
-# GCC's own warnings; what Google Benchmark's macros use.
-LET_PASS = ["-Wno-unknown-warning-option", "-Wno-c2y-extensions"]
+# Boost 1.74, which PCL includes, has enumerations that newer compilers refuse; where they do, an older
+# clang-tidy has to do.
+REFUSED, OLDER = "/boost/mpl/aux_/integral_wrapper.hpp", "clang-tidy-14"
+# GCC's own warnings; what Google Benchmark's macros and the standard library use.
+LET_PASS = [
+    "-Wno-unknown-warning-option",
+    "-Wno-c2y-extensions",
+    "-Wno-deprecated-declarations",
+]
 
 
 @functools.lru_cache(maxsize=None)
@@ -60,10 +67,10 @@ def _key(entry, files, version_and_rules):
     return digest.hexdigest()
 
 
-def _look_at(entry, key):
-    """Runs clang-tidy over one file; returns what it says, empty if clean."""
+def _say_of(tool, entry):
+    """What it says of one file, empty if clean."""
     outcome = subprocess.run(
-        [CLANG_TIDY, "-p", COMMANDS, "--quiet"]
+        [tool, "-p", COMMANDS, "--quiet"]
         + [*(f"--extra-arg={option}" for option in LET_PASS), entry["file"]],
         cwd=ROOT,
         stdin=subprocess.DEVNULL,
@@ -73,10 +80,18 @@ def _look_at(entry, key):
         errors="replace",
         check=False,
     )
-    if outcome.returncode == 0 and not outcome.stdout.strip():
+    is_clean = outcome.returncode == 0 and not outcome.stdout.strip()
+    return "" if is_clean else outcome.stdout + outcome.stderr
+
+
+def _look_at(entry, key):
+    """What is found in one file; remembered if it is nothing."""
+    found = _say_of(CLANG_TIDY, entry)
+    if REFUSED in found:
+        found = _say_of(OLDER, entry)
+    if not found:
         (CACHE / key).touch()
-        return ""
-    return outcome.stdout + outcome.stderr
+    return found
 
 
 def entries_of(folders):

@@ -84,7 +84,7 @@ class BruteForce {
                                   const Vector3d& target,
                                   double slack) const {
     const double flat_m = (target.head<2>() - place).norm();
-    // NOLINTNEXTLINE(bugprone-float-loop-counter): a coarse scan
+    // NOLINTNEXTLINE(bugprone-float-loop-counter,cert-flp30-c): a coarse scan
     for (double z_m = kVehicleRadius_m; z_m <= geometry_.box_m().max().z() + 1e-9; z_m += 0.01) {
       const double rise_m = target.z() - z_m;
       if (std::abs(std::atan2(rise_m, flat_m)) <= 0.5 * camera_.vertical_fov_rad + slack &&
