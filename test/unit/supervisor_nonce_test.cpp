@@ -97,6 +97,28 @@ TEST(SupervisorNonce, TheTokenOfTheFlightThatHasJustEndedIsNotAWishForAnother) {
   EXPECT_EQ(bench.supervisor.state(), State::kArming) << "half a second is time enough";
 }
 
+// What DISARM carries as a token is nobody's business.
+TEST(SupervisorNonce, ADisarmWithTheTokenOfTheFlightThatHasJustEndedIsHeeded) {
+  SupervisorBench bench;
+  ASSERT_TRUE(bench.take_off());
+  const std::uint32_t spent = arm_token(bench.nonce(), bench.session);
+  bench.facts.is_on_ground = true;
+  bench.facts.has_escs = false;
+  bench.step();
+  bench.facts.has_escs = true;
+  bench.step();
+  ASSERT_EQ(bench.supervisor.state(), State::kDisarmed);
+  bench.send_arm(ArmRequest::kArm);
+  bench.step();
+  ASSERT_EQ(bench.supervisor.state(), State::kArming);
+  bench.token = spent;
+
+  bench.send_arm(ArmRequest::kDisarm);
+  bench.step();
+
+  EXPECT_EQ(bench.supervisor.state(), State::kDisarmed);
+}
+
 TEST(SupervisorNonce, AfterADisarmingSetpointsMustHaveComeForHalfASecondAgain) {
   SupervisorBench bench;
   ASSERT_TRUE(bench.take_off());

@@ -59,12 +59,12 @@ void Supervisor::on_arm(const ArmCmd& command, Time now) {
   if (is_silent(last_arm_, kArmGapS, now)) {
     arms_in_row_ = disarms_in_row_ = 0;
   }
-  const bool is_spent = command.arm_token == arm_token(spent_nonce_, command.arm_session);
-  if (is_spent && flight_ended_ && !is_silent(flight_ended_, kArmGapS, now)) {
+  const bool is_wanted = command.arm_request == ArmRequest::kArm;
+  if (is_wanted && !is_silent(flight_ended_, kArmGapS, now) &&
+      command.arm_token == arm_token(spent_nonce_, command.arm_session)) {
     return;  // of a host that has not heard yet that the flight is over
   }
   last_arm_ = now;
-  const bool is_wanted = command.arm_request == ArmRequest::kArm;
   is_token_wrong_ = is_wanted && command.arm_token != arm_token(nonce_, command.arm_session);
   const bool is_disarming = command.arm_request == ArmRequest::kDisarm;
   arms_in_row_ = is_wanted && !is_token_wrong_ ? std::min(arms_in_row_ + 1, kCommandsInRow) : 0;
@@ -208,7 +208,6 @@ void Supervisor::enter(State state, StateReason reason) {
   const bool is_disarming = state == State::kDisarmed && state_ != State::kArming;
   if (is_disarming) {
     // What armed it once must not arm it again, so chance may not choose the same number twice.
-    spent_nonce_ = nonce_;
     nonce_ = (nonce_ + 1U + static_cast<std::uint32_t>(rng_.below(kNonces - 1U))) % kNonces;
   }
   if (is_disarming || state == State::kKilled) {
@@ -254,6 +253,7 @@ void Supervisor::update_flying(Time now) {
 void Supervisor::update(const VehicleFacts& facts, Time now) {
   facts_ = facts;
   const bool was_flying = is_flying(state_);
+  const std::uint32_t nonce = nonce_;
   switch (state_) {
     case State::kInit:
       enter(State::kDisarmed, StateReason::kPowerOn);
@@ -283,6 +283,7 @@ void Supervisor::update(const VehicleFacts& facts, Time now) {
   }
   if (was_flying && !is_flying(state_)) {
     flight_ended_ = now;
+    spent_nonce_ = nonce;
   }
 }
 

@@ -103,8 +103,8 @@ class Supervisor {
   StateReason reason_ = StateReason::kPowerOn;
   VehicleFacts facts_;
   std::uint32_t nonce_ = 0;
-  std::uint32_t spent_nonce_ = 0;  // of the flight that ended then
   std::optional<Time> flight_ended_;
+  std::uint32_t spent_nonce_ = 0;  // of the flight that ended then
   std::uint32_t arm_seq_ = 0;
 
   std::optional<Time> last_heartbeat_;
