@@ -22,7 +22,7 @@ from results import SuiteResult
 
 COMMANDS = ROOT / "build-test" / "tidy"  # compile_commands.json of all folders in one
 CACHE = pathlib.Path(os.environ.get("UNDERSTORY_TIDY_CACHE", ROOT / "build" / "tidy-cache"))
-CLANG_TIDY = "clang-tidy-22"  # the first one that leaves out system headers
+CLANG_TIDY = "clang-tidy-22"  # leaves out system headers
 # Headers that GCC has precompiled: clang cannot read them, and a file must include what it needs.
 GCC_HEADERS = re.compile(r"-fpch-preprocess|-Winvalid-pch -include \S+/cmake_pch\.hxx")
 # Boost 1.74, which PCL includes, has enumerations that newer compilers refuse; where they do, an older
@@ -130,9 +130,8 @@ def check_tidy(folders):
     result.failed += [f"{name} is compiled by no target" for name in left_out]
 
     rules = [name for name in our_files() if os.path.basename(name) == ".clang-tidy"]
-    version_and_rules = output_of([CLANG_TIDY, "--version"]) + "".join(
-        name + _content_hash(ROOT / name) for name in rules
-    )
+    versions = "".join(output_of([tool, "--version"]) for tool in (CLANG_TIDY, OLDER))
+    version_and_rules = versions + "".join(name + _content_hash(ROOT / name) for name in rules)
     CACHE.mkdir(parents=True, exist_ok=True)
     included = {folder: _included_files(folder) for folder in folders}
     keys = {
