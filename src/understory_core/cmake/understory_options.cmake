@@ -29,10 +29,12 @@ set(UNDERSTORY_COMMON_HEADERS
   <Eigen/Core> <Eigen/Geometry> <algorithm> <array> <chrono> <cmath> <functional> <limits> <map>
   <memory> <optional> <string> <string_view> <unordered_map> <vector>)
 
-# GCC 12 has false alarms about its own strings, which it keeps to itself only as long as it reads
-# them from a system header; the first option is for ccache.
-set(UNDERSTORY_PCH_OPTIONS
-  $<$<CXX_COMPILER_ID:GNU>:-fpch-preprocess$<SEMICOLON>-Wno-array-bounds$<SEMICOLON>-Wno-restrict$<SEMICOLON>-Wno-stringop-overflow$<SEMICOLON>-Wno-stringop-overread>)
+# The first option is for ccache. Of its own strings GCC 12 has false alarms, which it keeps to itself
+# only as long as it reads them from a system header.
+if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
+  set(UNDERSTORY_PCH_OPTIONS -fpch-preprocess
+    -Wno-array-bounds -Wno-restrict -Wno-stringop-overflow -Wno-stringop-overread)
+endif()
 
 # Headers as <name>, for all files of a target.
 function(understory_precompile target)
