@@ -11,6 +11,7 @@ from bench import MEMORY, FlightTest, summary_of
 FLIGHT_S = 8
 RATE_HZ = 200
 FEW = 0.01  # of what was sent, on a machine that is shared
+MOST_EXCUSED = 0.3
 STILLNESS_BORNE_S = 0.2  # of the 250 ms that a vehicle waits
 CATCHING_UP_S = 0.02  # after the machine stood still
 
@@ -44,6 +45,7 @@ class TheHighestRates(FlightTest):
         gaps = self.machine.gaps()
         excused = FEW + sum(end - begin + CATCHING_UP_S for begin, end in gaps) / seconds
         print(f"    the machine stood still {len(gaps)} times: {100 * excused:.1f} % are excused")
+        self.assertLess(excused, MOST_EXCUSED, "too little is left to be tested")
         for name in ("SP_COMMIT", "ODO_RATE"):
             stream = summary["messages"][name]
             self.assertGreater(stream["count"], (0.95 - excused) * RATE_HZ * seconds, name)
