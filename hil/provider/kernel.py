@@ -11,7 +11,7 @@ import subprocess
 import tempfile
 from pathlib import Path
 from types import TracebackType
-from typing import Dict, List, Optional, Tuple, Type
+from typing import Callable, Dict, List, Optional, Tuple, Type
 
 from job import HilError, Job
 from relay import Relay
@@ -19,6 +19,7 @@ from relay import Relay
 HERE = Path(__file__).resolve().parent
 NEEDED_INSIDE = {"ip": "iproute2", "tc": "iproute2", "modprobe": "kmod", "mount": "mount"}
 PYTHON = "/usr/bin/python3"
+Started = Tuple[List[str], Dict[str, str]]  # command line and environment
 
 
 def find_program(name: str) -> Optional[str]:
@@ -106,3 +107,24 @@ class KernelRun(contextlib.AbstractContextManager):  # type: ignore[type-arg]
                 os.killpg(self._kernel.pid, signal.SIGKILL)
             self._kernel.wait()
         shutil.rmtree(self.folder, ignore_errors=True)
+
+
+def not_bootable(job: Job) -> Optional[str]:
+    """Why no kernel can be booted for this, whichever it is."""
+    if job.existing_interface is not None:
+        return "--interface needs the host's own kernel"
+    if "UNDERSTORY_HIL_PROVIDER" in os.environ:
+        return "not within another provider"
+    return None
+
+
+def run_kernel(name: str, job: Job, prepare: Callable[[Path, int], Started]) -> int:
+    """The wait status of the command. `prepare` makes the kernel's command line and environment of
+    its folder and its end of the channel."""
+    with KernelRun(name) as run:
+        ours, theirs = socket.socketpair()
+        with ours, theirs:
+            command, environment = prepare(run.folder, theirs.fileno())
+            run.start(command, environment, (theirs.fileno(),))
+            theirs.close()
+            return run.relay(ours, job)

@@ -3,20 +3,19 @@
 """The provider that boots a distribution's kernel in QEMU, with the host's files as root (9P).
 
 For hosts that may not trace processes, as User-Mode Linux does. The processor is emulated: good for
-protocols, too slow to fly in real time. UNDERSTORY_QEMU_ACCEL=kvm makes it a quick one where the host
-allows that; it is not tried by itself, since with some hosts' /dev/kvm the kernel never starts.
+protocols, too slow to fly in real time. UNDERSTORY_QEMU_ACCEL=kvm uses the host's KVM; that is not
+tried by itself, since with some hosts' /dev/kvm the kernel never starts.
 """
 
 import gzip
 import os
 import platform
-import socket
 import subprocess
 from pathlib import Path
 from typing import Dict, List, Optional
 
 from job import HilError, Job
-from kernel import KernelRun, find_program, inside_needs
+from kernel import KernelRun, find_program, inside_needs, not_bootable, run_kernel
 
 EMULATOR = "qemu-system-x86_64"
 BUSYBOX = Path("/bin/busybox")
@@ -24,7 +23,7 @@ KERNELS, MODULES = Path("/boot"), Path("/lib/modules")
 DRIVERS = ("virtio_pci", "virtio_console", "9pnet_virtio", "9p")
 CHANNEL = "/dev/hvc0"
 # Until the host's files are there; then the agent is the first process. What the command writes must
-# be on the host's disk when it ends, so nothing is mapped or cached for longer than a file is open.
+# be on the host's disk when it ends, so only mapped files are cached.
 INIT = """\
 #!/bin/busybox sh
 for driver in /drivers/*; do /bin/busybox insmod "$driver"; done
@@ -34,7 +33,10 @@ exec /bin/busybox switch_root /host "$HIL_AGENT"
 
 
 def accelerator() -> str:
-    return os.environ.get("UNDERSTORY_QEMU_ACCEL", "tcg")
+    name = os.environ.get("UNDERSTORY_QEMU_ACCEL", "tcg")
+    if name not in ("tcg", "kvm"):
+        raise HilError(f"UNDERSTORY_QEMU_ACCEL={name}: expected tcg or kvm")
+    return name
 
 
 def kernel_with_can() -> Optional[Path]:
@@ -94,14 +96,12 @@ def write_first_files(folder: Path, release: str) -> Path:
 
 class Qemu:
     name = "qemu"
-    packages = "qemu-system-x86 linux-image-amd64 busybox-static cpio"
 
     def missing(self, job: Job) -> Optional[str]:
         """Why it cannot work here."""
-        if job.existing_interface is not None:
-            return "--interface needs the host's own kernel"
-        if "UNDERSTORY_HIL_PROVIDER" in os.environ:
-            return "not within another provider"
+        refused = not_bootable(job)
+        if refused is not None:
+            return refused
         if platform.machine() != "x86_64":
             return f"not on {platform.machine()}"
         if find_program(EMULATOR) is None:
@@ -116,13 +116,14 @@ class Qemu:
 
     def run(self, job: Job) -> int:
         """The wait status of the command."""
-        with KernelRun(self.name) as run:
-            ours, theirs = socket.socketpair()
-            with ours, theirs:
-                command = self._command(job, run.folder, theirs.fileno())
-                run.start(command, self._environment(run.folder), (theirs.fileno(),))
-                theirs.close()
-                return run.relay(ours, job)
+        return run_kernel(
+            self.name,
+            job,
+            lambda folder, channel: (
+                self._command(job, folder, channel),
+                self._environment(folder),
+            ),
+        )
 
     def _command(self, job: Job, folder: Path, channel: int) -> List[str]:
         kernel = kernel_with_can()

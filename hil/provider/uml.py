@@ -3,12 +3,11 @@
 """The provider that boots User-Mode Linux: a kernel as a process, with the host's files as root."""
 
 import os
-import socket
 from pathlib import Path
 from typing import Dict, List, Optional
 
 from job import HilError, Job
-from kernel import KernelRun, inside_needs
+from kernel import KernelRun, inside_needs, not_bootable, run_kernel
 from registers import KEPT_BY_UML, build_preload, compiler, traced_register_bytes
 
 KERNEL = Path("/usr/bin/linux.uml")
@@ -33,14 +32,12 @@ def memory_folder(memory_mib: int) -> Optional[str]:
 
 class Uml:
     name = "uml"
-    packages = "user-mode-linux"
 
     def missing(self, job: Job) -> Optional[str]:
         """Why it cannot work here."""
-        if job.existing_interface is not None:
-            return "--interface needs the host's own kernel"
-        if "UNDERSTORY_HIL_PROVIDER" in os.environ:
-            return "not within another provider"
+        refused = not_bootable(job)
+        if refused is not None:
+            return refused
         if not os.access(KERNEL, os.X_OK) or not MODULES.is_dir():
             return f"{KERNEL} is not there (package user-mode-linux)"
         lacking = inside_needs()
@@ -57,14 +54,14 @@ class Uml:
 
     def run(self, job: Job) -> int:
         """The wait status of the command."""
-        with KernelRun(self.name) as run:
-            ours, theirs = socket.socketpair()
-            with ours, theirs:
-                command = self._command(job, run.folder, theirs.fileno())
-                environment = self._environment(job, run.folder)
-                run.start(command, environment, (theirs.fileno(),))
-                theirs.close()
-                return run.relay(ours, job)
+        return run_kernel(
+            self.name,
+            job,
+            lambda folder, channel: (
+                self._command(job, folder, channel),
+                self._environment(job, folder),
+            ),
+        )
 
     def _command(self, job: Job, folder: Path, channel: int) -> List[str]:
         return [
