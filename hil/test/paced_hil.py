@@ -11,9 +11,10 @@ import unittest
 from pathlib import Path
 
 from bench import HOST_BUS, MEMORY, FlightTest, summary_of
-from can_tools import Frame, Port
+from can_tools import BUS, Frame, Port, must_run
 
 HIL_OPTIONS = ["--wire"]
+BITRATE, QUEUE = 1_000_000, 10
 BURST_S, PAUSE_S = 0.015, 0.05  # longer than from one setpoint to the next
 # canbusload counts bits of the frames in whole per cent, over a second.
 LOAD_TOLERANCE = 0.03
@@ -27,7 +28,7 @@ class ASlowBus(FlightTest):
         self.log_path = Path(folder.name) / "flight.log"
 
     def test_is_as_full_as_the_standard_tool_says(self) -> None:
-        load = self.run_program("canbusload", "-e", f"{HOST_BUS}@1000000")
+        load = self.run_program("canbusload", "-e", f"{HOST_BUS}@{BITRATE}")
         self.start_vehicle()
         host = self.start_host("--duration", 3, "--log", self.log_path)
 
@@ -65,14 +66,21 @@ class ASlowBus(FlightTest):
         self.assertEqual(states[-1], ("ARMED", "NONE"))
 
     def burst(self) -> None:
-        """Another station that sends as much as the queue takes."""
+        """Another station fills the queue, with frames that stay in it for BURST_S."""
+        stay = f"delay {1e3 * BURST_S:.0f}ms"
         with Port() as port:
             while not self.is_ending:
-                end_s = time.monotonic() + BURST_S
-                while time.monotonic() < end_s:
-                    with contextlib.suppress(OSError):  # full
+                self.shape(stay)
+                with contextlib.suppress(OSError):  # full
+                    while True:
                         port.send(Frame(0x7FF, bytes(8)))
+                time.sleep(BURST_S)
+                self.shape(f"rate {BITRATE}bit")
                 time.sleep(PAUSE_S)
+
+    @staticmethod
+    def shape(netem: str) -> None:
+        must_run(*f"tc qdisc replace dev {BUS} root netem {netem} limit {QUEUE}".split())
 
 
 if __name__ == "__main__":
