@@ -41,9 +41,4 @@ class ViewpointSampler {
   double max_range_m_;
 };
 
-// Straight line through known free space, both ends included.
-[[nodiscard]] bool line_is_free(const ClearanceMap& map,
-                                const Vector3d& from_m,
-                                const Vector3d& to_m);
-
 }  // namespace understory

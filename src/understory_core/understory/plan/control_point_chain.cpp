@@ -16,6 +16,8 @@ constexpr double kLimitShare = 0.995;
 // A turn that is planned anew while it still gains speed runs over by up to 1.3 %.
 constexpr double kYawRateShare = 0.98;
 constexpr double kStandstill_mps = 1e-9;
+// Of the yaw acceleration that braking at the end of a course counts on.
+constexpr double kCourseBrakeShare = 0.8;
 
 CubicBSpline<double> yaw_along(const TrapezoidProfile& profile,
                                const std::array<double, 3>& first,
@@ -31,6 +33,32 @@ CubicBSpline<double> yaw_along(const TrapezoidProfile& profile,
 
 RateLimits yaw_limits(const Limits& limits) {
   return {kYawRateShare * limits.yaw_rate_radps, kLimitShare * limits.yaw_acceleration_radps2};
+}
+
+// The fastest way round from what the first three control points are to rest at the goal.
+CubicBSpline<double> turn_to(const std::array<double, 3>& first,
+                             double goal_yaw_rad,
+                             const Limits& limits) {
+  const double rate_radps = (first[2] - first[1]) / kYawKnot_s;
+  const double nearest_rad = first[2] + angle_difference(goal_yaw_rad, first[2]);
+  const auto profile_to = [&](double target_rad) {
+    return TrapezoidProfile(target_rad - first[2], rate_radps, yaw_limits(limits));
+  };
+  double target_rad = nearest_rad;
+  for (const double turn_rad : {-2.0 * kPi, 2.0 * kPi}) {
+    if (profile_to(nearest_rad + turn_rad).duration_s() < profile_to(target_rad).duration_s()) {
+      target_rad = nearest_rad + turn_rad;
+    }
+  }
+  return yaw_along(profile_to(target_rad), first, target_rad);
+}
+
+double at(const YawCourse& course, double time_s) {
+  const double steps = std::max(0.0, time_s / course.step_s);
+  const auto before = std::min(static_cast<std::size_t>(steps), course.yaw_rad.size() - 1);
+  const std::size_t after = std::min(before + 1, course.yaw_rad.size() - 1);
+  const double share = std::min(1.0, steps - static_cast<double>(before));
+  return course.yaw_rad[before] + share * (course.yaw_rad[after] - course.yaw_rad[before]);
 }
 
 }  // namespace
@@ -94,19 +122,34 @@ CubicBSpline<Vector3d> ControlPointChain::finished() {
 CubicBSpline<double> yaw_spline(const CubicBSpline<double>::Sample& start,
                                 double goal_yaw_rad,
                                 const Limits& limits) {
+  return turn_to(control_points_for<double>(start, kYawKnot_s), goal_yaw_rad, limits);
+}
+
+CubicBSpline<double> yaw_spline_along(const CubicBSpline<double>::Sample& start,
+                                      const YawCourse& course,
+                                      double goal_yaw_rad,
+                                      const Limits& limits) {
   const std::array<double, 3> first = control_points_for<double>(start, kYawKnot_s);
-  const double rate_radps = (first[2] - first[1]) / kYawKnot_s;
-  const double nearest_rad = first[2] + angle_difference(goal_yaw_rad, first[2]);
-  const auto profile_to = [&](double target_rad) {
-    return TrapezoidProfile(target_rad - first[2], rate_radps, yaw_limits(limits));
-  };
-  double target_rad = nearest_rad;
-  for (const double turn_rad : {-2.0 * kPi, 2.0 * kPi}) {
-    if (profile_to(nearest_rad + turn_rad).duration_s() < profile_to(target_rad).duration_s()) {
-      target_rad = nearest_rad + turn_rad;
-    }
+  std::vector<double> points{first.begin(), first.end()};
+  const RateLimits rates = yaw_limits(limits);
+  const auto steps =
+      static_cast<int>(static_cast<double>(course.yaw_rad.size() - 1) * course.step_s / kYawKnot_s);
+  for (int i = 1; i < steps; ++i) {
+    const double rate_radps = (points.back() - points[points.size() - 2]) / kYawKnot_s;
+    const double left_rad = at(course, i * kYawKnot_s) - points.back();
+    // No faster than it can be stopped there.
+    const double most_radps = std::min(
+        rates.rate, std::sqrt(2.0 * kCourseBrakeShare * rates.acceleration * std::abs(left_rad)));
+    const double wanted_radps = std::clamp(left_rad / kYawKnot_s, -most_radps, most_radps);
+    const double most_change = rates.acceleration * kYawKnot_s;
+    const double change = std::clamp(wanted_radps - rate_radps, -most_change, most_change);
+    points.push_back(points.back() + (rate_radps + change) * kYawKnot_s);
   }
-  return yaw_along(profile_to(target_rad), first, target_rad);
+  const std::size_t last = points.size() - 1;
+  const CubicBSpline<double> rest =
+      turn_to({points[last - 2], points[last - 1], points[last]}, goal_yaw_rad, limits);
+  points.insert(points.end(), rest.control_points.begin() + 3, rest.control_points.end());
+  return {points, kYawKnot_s};
 }
 
 CubicBSpline<double> stopping_yaw_spline(const CubicBSpline<double>::Sample& start,

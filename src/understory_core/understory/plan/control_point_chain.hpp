@@ -46,6 +46,17 @@ class ControlPointChain {
 [[nodiscard]] CubicBSpline<double> yaw_spline(const CubicBSpline<double>::Sample& start,
                                               double goal_yaw_rad,
                                               const Limits& limits);
+// Yaw at equal steps of time.
+struct YawCourse {
+  std::vector<double> yaw_rad;  // continuous, not wrapped
+  double step_s = 0.1;
+};
+
+// Follows a course as well as the limits admit, then goes to `goal_yaw_rad` as above.
+[[nodiscard]] CubicBSpline<double> yaw_spline_along(const CubicBSpline<double>::Sample& start,
+                                                    const YawCourse& course,
+                                                    double goal_yaw_rad,
+                                                    const Limits& limits);
 // Yaw rate to zero as soon as possible.
 [[nodiscard]] CubicBSpline<double> stopping_yaw_spline(const CubicBSpline<double>::Sample& start,
                                                        const Limits& limits);

@@ -45,6 +45,7 @@ Result<TrajectoryPtr, PlanError> Pilot::fly(const FlightGoal& goal, Time now) {
   request.start_time = next_start(now);
   request.route_m = goal.route_m;
   request.goal_yaw_rad = goal.yaw_rad;
+  request.sights = goal.sights;
   request.limits = goal.limits;
   request.mode = goal.mode;
   Result<Trajectory, PlanError> planned = planner_.plan(clearance_, request);

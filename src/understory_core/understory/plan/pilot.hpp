@@ -21,6 +21,7 @@ struct FlightGoal {
   double yaw_rad = 0.0;
   FlightMode mode = FlightMode::kExplorer;
   Limits limits;
+  std::vector<Sight> sights = {};  // to be looked at on the way
 };
 
 struct PilotCounters {

@@ -2,18 +2,25 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "understory/plan/route_lattice.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 namespace understory {
 
-RouteLattice::RouteLattice(const GridGeometry& geometry)
-    : resolution_m_(geometry.resolution_m()), first_(geometry.voxels().min) {
-  first_.z() += kFirstLayerVoxels;
+RouteLattice::RouteLattice(const GridGeometry& geometry, const Spacing& spacing)
+    : resolution_m_(geometry.resolution_m()), spacing_(spacing), first_(geometry.voxels().min) {
+  first_.z() += spacing_.first_layer_voxels;
   const Vector3i size = geometry.voxels().end - first_;
-  count_ = Vector3i((size.x() + kStepVoxels - 1) / kStepVoxels,
-                    (size.y() + kStepVoxels - 1) / kStepVoxels,
-                    (size.z() + kLayerStepVoxels - 1) / kLayerStepVoxels)
+  const auto steps = [](int voxels, int step) { return (voxels + step - 1) / step; };
+  count_ = Vector3i(steps(size.x(), spacing_.step_voxels),
+                    steps(size.y(), spacing_.step_voxels),
+                    steps(size.z(), spacing_.layer_step_voxels))
                .cwiseMax(0);
+}
+
+RouteLattice::Spacing RouteLattice::flat(const GridGeometry& geometry, int step_voxels) {
+  const int height = geometry.voxels().end.z() - geometry.voxels().min.z();
+  return {step_voxels, std::max(height, 1), height / 2};
 }
 
 RouteLattice::Node RouteLattice::node_of_index(std::size_t index) const {
@@ -26,9 +33,9 @@ RouteLattice::Node RouteLattice::node_of_index(std::size_t index) const {
 
 RouteLattice::Node RouteLattice::nearest(const Vector3d& point_m) const {
   const Vector3d local = point_m / resolution_m_ - (first_.cast<double>().array() + 0.5).matrix();
-  return {static_cast<int>(std::lround(local.x() / kStepVoxels)),
-          static_cast<int>(std::lround(local.y() / kStepVoxels)),
-          static_cast<int>(std::lround(local.z() / kLayerStepVoxels))};
+  return {static_cast<int>(std::lround(local.x() / spacing_.step_voxels)),
+          static_cast<int>(std::lround(local.y() / spacing_.step_voxels)),
+          static_cast<int>(std::lround(local.z() / spacing_.layer_step_voxels))};
 }
 
 }  // namespace understory

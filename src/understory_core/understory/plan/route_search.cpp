@@ -37,9 +37,11 @@ int safe_squared_distance(double radius_voxels) {
 
 }  // namespace
 
-RouteSearch::RouteSearch(const GridGeometry& geometry, double clearance_m)
-    : lattice_(geometry),
-      cost_unit_m_(RouteLattice::kStepVoxels * geometry.resolution_m() / kStraightCost),
+RouteSearch::RouteSearch(const GridGeometry& geometry,
+                         double clearance_m,
+                         const RouteLattice::Spacing& spacing)
+    : lattice_(geometry, spacing),
+      cost_unit_m_(lattice_.step_m() / kStraightCost),
       min_squared_distance_(safe_squared_distance(clearance_m / geometry.resolution_m())),
       // Half-way the ball may come nearer by what half a step bends the nearest surface away.
       min_edge_squared_distance_(

@@ -19,7 +19,11 @@ namespace understory {
 
 class RouteSearch {
  public:
-  RouteSearch(const GridGeometry& geometry, double clearance_m);
+  RouteSearch(const GridGeometry& geometry, double clearance_m)
+      : RouteSearch(geometry, clearance_m, RouteLattice::Spacing{}) {}
+  RouteSearch(const GridGeometry& geometry,
+              double clearance_m,
+              const RouteLattice::Spacing& spacing);
 
   // Searches from `start_m` as far as max_length_m, or until every target is settled. `map` must
   // outlive the use of the results. A start that is too close to something enters the lattice at

@@ -200,6 +200,32 @@ bool within_limits(const Trajectory& trajectory) {
   }
 }
 
+// The same way, but looking to the sides where that takes no longer.
+Trajectory TrajectoryPlanner::looking(const ClearanceMap& map,
+                                      const PlanRequest& request,
+                                      const Trajectory& planned) const {
+  if (!config_.look.is_on || request.sights.empty()) {
+    return planned;
+  }
+  const double longest_s = std::max(planned.position.duration_s(), planned.yaw.duration_s());
+  LookConfig config = config_.look;
+  // The camera lags behind the course that it is given, the more the more it turns.
+  for (const double lag_s : {0.0, 0.5, 1.0}) {
+    config.spare_s = config_.look.spare_s + lag_s;
+    const std::optional<CubicBSpline<double>> yaw =
+        looking_yaw(map, request.sights, planned, config);
+    if (!yaw) {
+      return planned;
+    }
+    Trajectory trajectory = planned;
+    trajectory.yaw = *yaw;
+    if (yaw->duration_s() <= longest_s && within_limits(trajectory)) {
+      return trajectory;
+    }
+  }
+  return planned;
+}
+
 Result<Trajectory, PlanError> TrajectoryPlanner::plan(const ClearanceMap& map,
                                                       const PlanRequest& request) const {
   if (request.route_m.empty() || !is_finite(request)) {
@@ -242,17 +268,17 @@ Result<Trajectory, PlanError> TrajectoryPlanner::plan(const ClearanceMap& map,
   if (task.vertices_m.size() > 1 && optimised(task, config_.preferred_clearance_m, verdict)) {
     smooth = trajectory;
     if (!is_sluggish(smooth->position.duration_s(), task)) {
-      return *smooth;
+      return looking(map, request, *smooth);
     }
   }
   const std::optional<PlanError> error = verdict(stop_at_corners(task));
   if (smooth && (error || smooth->position.duration_s() <= trajectory.position.duration_s())) {
-    return *smooth;
+    return looking(map, request, *smooth);
   }
   if (error) {
     return *error;
   }
-  return trajectory;
+  return looking(map, request, trajectory);
 }
 
 }  // namespace understory

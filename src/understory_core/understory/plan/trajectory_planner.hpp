@@ -16,6 +16,7 @@
 #include "understory/base/config.hpp"
 #include "understory/base/result.hpp"
 #include "understory/plan/clearance_map.hpp"
+#include "understory/plan/look_around.hpp"
 #include "understory/plan/trajectory.hpp"
 
 namespace understory {
@@ -26,6 +27,7 @@ struct PlanConfig {
   double recheck_margin_m = 0.05;  // over the radius, when a flown trajectory is checked again
   double preferred_clearance_m = 0.45;
   double horizon_m = 8.0;  // longer routes are flown piece by piece
+  LookConfig look;
 
   void visit(FieldVisitor& f) {
     f.field("vehicle_radius_m", vehicle_radius_m, in_range(0.05, 2.0), "sphere around the vehicle");
@@ -43,6 +45,7 @@ struct PlanConfig {
             horizon_m,
             in_range(2.0, 50.0),
             "longest piece of a route that one trajectory covers");
+    f.section("look", look, "Where the camera looks on the way; not in the paper.");
   }
 };
 
@@ -54,6 +57,7 @@ struct PlanRequest {
   Time start_time{};
   std::vector<Vector3d> route_m;  // from the start's position to the goal, collision-free legs
   double goal_yaw_rad = 0.0;
+  std::vector<Sight> sights;  // to be looked at on the way, where that costs no time
   Limits limits;
   FlightMode mode = FlightMode::kExplorer;
 };
@@ -71,6 +75,10 @@ class TrajectoryPlanner {
                                                          Time from) const;
 
  private:
+  [[nodiscard]] Trajectory looking(const ClearanceMap& map,
+                                   const PlanRequest& request,
+                                   const Trajectory& planned) const;
+
   PlanConfig config_;
 };
 
