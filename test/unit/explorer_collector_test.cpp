@@ -137,6 +137,20 @@ TEST(Choice, CollectorTakesTheQuickestTrailAndIgnoresFrontiers) {
   EXPECT_EQ(target->candidate.cluster->id, 3U);
 }
 
+TEST(Choice, CollectorWhoseModeOnlySetsThePaceChoosesAsAnExplorer) {
+  StrategyInput input = eastbound();
+  input.candidates = {candidate_at(1, {5, 0, 0}, kFrontier), candidate_at(2, {-4, 0, 0}, kTrail)};
+  ExplorerCollectorConfig config;
+  EXPECT_EQ(strategy(config).choose(input)->candidate.cluster->id, 2U);
+  config.mode.only_sets_pace = true;
+
+  const std::optional<Target> target = strategy(config).choose(input);
+
+  ASSERT_TRUE(target.has_value());
+  EXPECT_EQ(target->mode, FlightMode::kCollector);
+  EXPECT_EQ(target->candidate.cluster->id, 1U);
+}
+
 TEST(Choice, TwoEqualTargetsDoNotAlternate) {
   StrategyInput input;
   int changes = 0;

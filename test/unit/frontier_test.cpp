@@ -216,6 +216,24 @@ MapSnapshotPtr room_with_pillar(SnapshotBuilder& builder, double angle_rad) {
   return builder.build();
 }
 
+TEST(FrontierFinder, KeepsApartWhatBordersAnIslandTooSmallToVisit) {
+  SnapshotBuilder builder(0.10, kBox);
+  builder.fill(VoxelState::kFree);
+  builder.set_box({Vector3d(-0.5, -0.5, 0.5), Vector3d(0.5, 0.5, 1.5)}, VoxelState::kUnknown);
+  FrontierConfig config;
+  config.min_cluster_voxels = 10;
+  config.min_island_share = 1.0;
+  config.min_island_m3 = 0.5;
+  Bench wanted(builder, config);
+  config.min_island_m3 = 2.0;
+  Bench unwanted(builder, config);
+
+  EXPECT_FALSE(wanted.update(builder).empty());
+  EXPECT_TRUE(wanted.finder.worthless().empty());
+  EXPECT_TRUE(unwanted.update(builder).empty());
+  EXPECT_EQ(unwanted.finder.worthless().size(), wanted.finder.clusters().size());
+}
+
 TEST(TrailLabel, ClusterSurroundedByFreeSpaceIsATrail) {
   SnapshotBuilder builder(0.10, kBox);
   builder.fill(VoxelState::kFree)

@@ -121,6 +121,31 @@ TEST(Scenario, WrongChoicesAreNamedAsThoseOfTheCommandLine) {
   }
 }
 
+TEST(Scenario, AStrategyBringsItsSettings) {
+  ScenarioChoice fuel;
+  fuel.strategy = "fuel";
+  ScenarioChoice paper;
+  paper.strategy = "paper";
+  ScenarioChoice ours;
+  ours.strategy = "explorer_collector";
+
+  EXPECT_EQ(load_scenario(shipped(), fuel).explorer.strategy, "fuel");
+  EXPECT_DOUBLE_EQ(load_scenario(shipped(), fuel).explorer.frontier.viewpoints.max_radius_m, 2.5);
+  EXPECT_EQ(load_scenario(shipped(), paper).explorer.strategy, "paper");
+  EXPECT_DOUBLE_EQ(load_scenario(shipped(), paper).explorer.explorer_collector.explorer.ring_weight,
+                   0.0);
+  EXPECT_GT(load_scenario(shipped(), ours).explorer.explorer_collector.explorer.ring_weight, 0.0);
+}
+
+// What a strategy brings is for all scenes; what the command line says comes last.
+TEST(Scenario, OverridesAreStrongerThanAStrategysSettings) {
+  ScenarioChoice choice;
+  choice.strategy = "fuel";
+  choice.overrides = "frontier: {seen_share: 0.9}";
+
+  EXPECT_DOUBLE_EQ(load_scenario(shipped(), choice).explorer.frontier.seen_share, 0.9);
+}
+
 TEST(Scenario, ForestFileReplacesTheGeneratedForest) {
   ScenarioChoice choice;
   choice.forest_file = "stems.csv";

@@ -11,8 +11,21 @@ namespace {
 // Routes keep a little more distance than trajectories must, so that smoothing has room.
 constexpr double kRouteExtraClearanceM = 0.04;
 
+constexpr double kUnreachable = std::numeric_limits<double>::infinity();
+
+double route_clearance_m(const PlanConfig& plan) {
+  return plan.vehicle_radius_m + plan.margin_m + kRouteExtraClearanceM;
+}
+
 std::unique_ptr<Strategy> make_strategy(const ExplorerConfig& config,
                                         const GridGeometry& geometry) {
+  if (config.strategy == "fuel") {
+    const Limits limits = config.limits.limits_for(FlightMode::kExplorer);
+    return std::make_unique<Fuel>(
+        config.fuel,
+        FuelRates{limits.speed_mps, limits.yaw_rate_radps, route_clearance_m(config.plan)},
+        geometry);
+  }
   const Limits limits = config.limits.limits_for(FlightMode::kCollector);
   const TravelRates rates{
       limits.speed_mps, limits.acceleration_mps2, limits.yaw_rate_radps, geometry.box_m()};
@@ -34,9 +47,10 @@ Limits LimitsConfig::limits_for(FlightMode mode) const {
 
 Explorer::Explorer(const ExplorerConfig& config, const GridGeometry& geometry)
     : config_(config),
-      routes_(geometry,
-              config.plan.vehicle_radius_m + config.plan.margin_m + kRouteExtraClearanceM),
+      geometry_(geometry),
+      routes_(geometry, route_clearance_m(config.plan)),
       tight_routes_(geometry, config.plan.vehicle_radius_m + config.plan.margin_m),
+      far_routes_(geometry, route_clearance_m(config.plan)),
       finder_(config.frontier, config.camera, geometry),
       strategy_(make_strategy(config, geometry)),
       set_aside_(duration_from_seconds(config.retry.set_aside_s), config.retry.max_tries) {}
@@ -116,11 +130,11 @@ bool Explorer::is_due(const Pilot& pilot, Time now) const {
 
 StrategyInput Explorer::gather(const Pilot& pilot, Time now, Reach reach) {
   StrategyInput input;
+  input.map = &pilot.clearance();
   input.is_complete = reach != Reach::kNear;
   input.vehicle = pilot.next_start_point(now);
   input.mode = mode_;
   input.target = target_ ? target_->candidate.cluster : nullptr;
-  std::vector<RouteLattice::Node> nodes;
   for (const ClusterPtr& cluster : finder_.clusters()) {
     if (set_aside_.is_given_up(*cluster) ||
         (reach < Reach::kAllAndSetAside && set_aside_.is_waiting(*cluster, now))) {
@@ -128,24 +142,62 @@ StrategyInput Explorer::gather(const Pilot& pilot, Time now, Reach reach) {
     }
     for (const Viewpoint& viewpoint : cluster->viewpoints) {
       if (!set_aside_.is_banned(viewpoint)) {
-        input.candidates.push_back({cluster, viewpoint, 0.0});
-        nodes.push_back(viewpoint.node);
+        input.candidates.push_back({cluster, viewpoint, kUnreachable});
       }
     }
   }
-  const double max_length_m =
-      reach == Reach::kNear ? config_.replan.near_route_m : std::numeric_limits<double>::infinity();
-  RouteSearch& routes = reach == Reach::kThroughTightGaps ? tight_routes_ : routes_;
-  routes.run(pilot.clearance(), input.vehicle.position_m, nodes, max_length_m);
-  const auto unreachable = [&routes](Candidate& candidate) {
-    const std::optional<double> length_m = routes.length_m(candidate.viewpoint.node);
-    candidate.route_length_m = length_m.value_or(0.0);
-    return !length_m.has_value();
-  };
+  measure(pilot, reach, input);
+  const auto is_unreachable = [](const Candidate& c) { return c.route_length_m == kUnreachable; };
   input.candidates.erase(
-      std::remove_if(input.candidates.begin(), input.candidates.end(), unreachable),
+      std::remove_if(input.candidates.begin(), input.candidates.end(), is_unreachable),
       input.candidates.end());
   return input;
+}
+
+// The lengths of the routes to all candidates.
+void Explorer::measure(const Pilot& pilot, Reach reach, StrategyInput& input) {
+  std::vector<RouteLattice::Node> nodes;
+  nodes.reserve(input.candidates.size());
+  for (const Candidate& candidate : input.candidates) {
+    nodes.push_back(candidate.viewpoint.node);
+  }
+  const double max_length_m = reach < Reach::kAll ? config_.replan.near_route_m : kUnreachable;
+  RouteSearch& routes = reach == Reach::kThroughTightGaps ? tight_routes_ : routes_;
+  routes.run(pilot.clearance(), input.vehicle.position_m, nodes, max_length_m);
+  for (Candidate& candidate : input.candidates) {
+    candidate.route_length_m = routes.length_m(candidate.viewpoint.node).value_or(kUnreachable);
+  }
+  if (reach == Reach::kFar) {
+    estimate(pilot.clearance(), input);
+  }
+}
+
+// Of those that have none yet.
+void Explorer::estimate(const ClearanceMap& map, StrategyInput& input) {
+  std::vector<Candidate*> far;
+  CoarseRoutes::Entries entries;
+  for (Candidate& candidate : input.candidates) {
+    if (candidate.route_length_m == kUnreachable) {
+      far.push_back(&candidate);
+      entries.push_back(far_routes_.entry_of(map, candidate.viewpoint.position_m));
+    }
+  }
+  const std::vector<std::optional<double>> lengths_m =
+      far_routes_.lengths_m(map, input.vehicle.position_m, entries);
+  for (std::size_t i = 0; i < far.size(); ++i) {
+    if (lengths_m[i]) {
+      // Nearer than this the exact search would have found it.
+      far[i]->route_length_m = std::max(*lengths_m[i], config_.replan.near_route_m);
+    }
+  }
+}
+
+bool Explorer::has_route(RouteSearch& routes, const StrategyInput& input, const Target& target) {
+  const RouteLattice::Node& node = target.candidate.viewpoint.node;
+  if (!routes.length_m(node)) {
+    routes.run(*input.map, input.vehicle.position_m, {node}, kUnreachable);
+  }
+  return routes.length_m(node).has_value();
 }
 
 void Explorer::adopt(const Target& target, const Pilot& pilot, Time now) {
@@ -165,30 +217,53 @@ bool Explorer::is_on_the_way_to(const Target& target, const Pilot& pilot) const 
          is_same_place(*target_->candidate.cluster, *target.candidate.cluster);
 }
 
+// A few voxels of each cluster, those not worth a flight of their own too. The target is seen at
+// the end.
+std::vector<Sight> Explorer::sights(const Candidate& target) const {
+  constexpr std::size_t kPerCluster = 4;
+  std::vector<Sight> found;
+  const auto add = [&](const ClusterPtr& cluster) {
+    const std::size_t count = std::min(cluster->voxels.size(), kPerCluster);
+    for (std::size_t i = 0; i < count; ++i) {
+      const VoxelIndex& voxel = cluster->voxels[i * cluster->voxels.size() / count];
+      found.push_back({geometry_.center_of(voxel),
+                       static_cast<double>(cluster->voxels.size()) / static_cast<double>(count)});
+    }
+  };
+  for (const ClusterPtr& cluster : finder_.clusters()) {
+    if (cluster != target.cluster && !set_aside_.is_given_up(*cluster)) {
+      add(cluster);
+    }
+  }
+  std::for_each(finder_.worthless().begin(), finder_.worthless().end(), add);
+  return found;
+}
+
 // Null: what is flown goes there already, or none of the targets tried can be flown to.
 TrajectoryPtr Explorer::try_targets(
-    Pilot& pilot, const RouteSearch& routes, StrategyInput input, Time now, bool in_danger) {
-  for (int attempt = 0; attempt < config_.replan.max_attempts; ++attempt) {
-    const std::optional<Target> target = strategy_->choose(input);
-    if (!target) {
-      return nullptr;
-    }
+    Pilot& pilot, RouteSearch& routes, Choice choice, Time now, bool in_danger) {
+  auto& [input, target] = choice;
+  for (int attempt = 0; target && attempt < config_.replan.max_attempts; ++attempt) {
     if (attempt == 0 && !in_danger && is_on_the_way_to(*target, pilot) &&
         !is_sluggish(pilot, now)) {
       return nullptr;
     }
-    const Result<TrajectoryPtr, PlanError> flown =
-        pilot.fly({routes.route_m(target->candidate.viewpoint.node),
-                   target->candidate.viewpoint.yaw_rad,
-                   target->mode,
-                   config_.limits.limits_for(target->mode)},
-                  now);
-    if (flown) {
-      adopt(*target, pilot, now);
-      return *flown;
+    const bool is_reachable = has_route(routes, input, *target);
+    if (is_reachable) {
+      const Result<TrajectoryPtr, PlanError> flown =
+          pilot.fly({routes.route_m(target->candidate.viewpoint.node),
+                     target->candidate.viewpoint.yaw_rad,
+                     target->mode,
+                     config_.limits.limits_for(target->mode),
+                     sights(target->candidate)},
+                    now);
+      if (flown) {
+        adopt(*target, pilot, now);
+        return *flown;
+      }
     }
     // From motion a plan may fail that works from rest; only then is the target to blame.
-    if (pilot.is_at_rest(now)) {
+    if (is_reachable && pilot.is_at_rest(now)) {
       counters_.given_up += set_aside_.add(*target->candidate.cluster, now) ? 1U : 0U;
       ++counters_.set_aside;
     }
@@ -198,6 +273,7 @@ TrajectoryPtr Explorer::try_targets(
                        input.candidates.end(),
                        [failed](const Candidate& c) { return c.cluster.get() == failed; }),
         input.candidates.end());
+    target = strategy_->choose(input);
   }
   return nullptr;
 }
@@ -209,15 +285,19 @@ ExploreStep Explorer::decide(Pilot& pilot, Time now, bool in_danger) {
   last_decision_ = now;
   finder_.form(pilot.clearance(), routes_);
   for (const Reach reach :
-       {Reach::kNear, Reach::kAll, Reach::kAllAndSetAside, Reach::kThroughTightGaps}) {
-    const StrategyInput input = gather(pilot, now, reach);
-    counters_.full_searches += reach == Reach::kAll ? 1U : 0U;
-    if (!strategy_->choose(input)) {
+       {Reach::kNear, Reach::kFar, Reach::kAll, Reach::kAllAndSetAside, Reach::kThroughTightGaps}) {
+    if (reach == Reach::kNear && strategy_->needs_all()) {
       continue;
     }
-    step.published = try_targets(
-        pilot, reach == Reach::kThroughTightGaps ? tight_routes_ : routes_, input, now, in_danger);
-    return step;
+    Choice choice{gather(pilot, now, reach), std::nullopt};
+    counters_.full_searches += reach == Reach::kAll ? 1U : 0U;
+    choice.target = strategy_->choose(choice.input);
+    RouteSearch& routes = reach == Reach::kThroughTightGaps ? tight_routes_ : routes_;
+    if (choice.target &&
+        (reach != Reach::kFar || has_route(routes, choice.input, *choice.target))) {
+      step.published = try_targets(pilot, routes, std::move(choice), now, in_danger);
+      return step;
+    }
   }
   step.status = ExploreStatus::kNothingLeft;
   return step;

@@ -59,7 +59,13 @@ class Explorer {
   [[nodiscard]] RouteSearch& tight_routes() { return tight_routes_; }
 
  private:
-  enum class Reach : std::uint8_t { kNear, kAll, kAllAndSetAside, kThroughTightGaps };
+  // How far targets are looked for; the lengths to those far away are estimates with kFar.
+  enum class Reach : std::uint8_t { kNear, kFar, kAll, kAllAndSetAside, kThroughTightGaps };
+
+  struct Choice {
+    StrategyInput input;
+    std::optional<Target> target;
+  };
 
   [[nodiscard]] bool is_sluggish(const Pilot& pilot, Time now) const;
   [[nodiscard]] bool is_due(const Pilot& pilot, Time now) const;
@@ -67,14 +73,22 @@ class Explorer {
   [[nodiscard]] bool is_on_the_way_to(const Target& target, const Pilot& pilot) const;
   void review_target(const Pilot& pilot, Time now);
   [[nodiscard]] StrategyInput gather(const Pilot& pilot, Time now, Reach reach);
+  void measure(const Pilot& pilot, Reach reach, StrategyInput& input);
+  void estimate(const ClearanceMap& map, StrategyInput& input);
+  [[nodiscard]] static bool has_route(RouteSearch& routes,
+                                      const StrategyInput& input,
+                                      const Target& target);
   ExploreStep decide(Pilot& pilot, Time now, bool in_danger);
   [[nodiscard]] TrajectoryPtr try_targets(
-      Pilot& pilot, const RouteSearch& routes, StrategyInput input, Time now, bool in_danger);
+      Pilot& pilot, RouteSearch& routes, Choice choice, Time now, bool in_danger);
+  [[nodiscard]] std::vector<Sight> sights(const Candidate& target) const;
   void adopt(const Target& target, const Pilot& pilot, Time now);
 
   ExplorerConfig config_;
+  GridGeometry geometry_;
   RouteSearch routes_;
   RouteSearch tight_routes_;
+  CoarseRoutes far_routes_;
   FrontierFinder finder_;
   std::unique_ptr<Strategy> strategy_;
   SetAsideList set_aside_;

@@ -12,6 +12,7 @@
 #include "understory/plan/trajectory_planner.hpp"
 #include "understory/sense/camera_model.hpp"
 #include "understory/strategy/explorer_collector.hpp"
+#include "understory/strategy/fuel.hpp"
 
 namespace understory {
 
@@ -111,6 +112,7 @@ struct ExplorerConfig {
   RetryConfig retry;
   std::string strategy = "explorer_collector";
   ExplorerCollectorConfig explorer_collector;
+  FuelConfig fuel;
 
   void visit(FieldVisitor& f) {
     f.section("camera", camera, "The depth camera.");
@@ -120,8 +122,13 @@ struct ExplorerConfig {
     f.section("limits", limits, "What the vehicle may do.");
     f.section("replan", replan, "When decisions are made.");
     f.section("retry", retry, "Targets that do not work out.");
-    f.field("strategy", strategy, {"explorer_collector"}, "how targets are chosen");
+    f.field("strategy",
+            strategy,
+            {"explorer_collector", "paper", "fuel"},
+            "how targets are chosen: paper is explorer_collector under the name that its settings "
+            "as printed go by (config/strategies)");
     f.section("explorer_collector", explorer_collector, "The paper's strategy.");
+    f.section("fuel", fuel, "The paper's baseline: the shortest tour over all clusters.");
   }
 };
 

@@ -215,10 +215,10 @@ const std::vector<ClusterPtr>& FrontierFinder::form(const ClearanceMap& map,
   refresh(map, routes, formed);
   pending_ = {};
   clusters_.clear();
+  worthless_.clear();
   for (const auto& [id, member] : members_) {
-    if (member->voxels.size() >= static_cast<std::size_t>(config_.min_cluster_voxels) &&
-        !member->is_worthless) {
-      clusters_.push_back(member);
+    if (member->voxels.size() >= static_cast<std::size_t>(config_.min_cluster_voxels)) {
+      (member->is_worthless ? worthless_ : clusters_).push_back(member);
     }
   }
   return clusters_;

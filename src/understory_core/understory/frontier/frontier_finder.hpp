@@ -34,6 +34,8 @@ class FrontierFinder {
   const std::vector<ClusterPtr>& form(const ClearanceMap& map, const RouteSearch& routes);
 
   [[nodiscard]] const std::vector<ClusterPtr>& clusters() const { return clusters_; }
+  // Those that border an island too small to be worth a visit; clusters() has none of them.
+  [[nodiscard]] const std::vector<ClusterPtr>& worthless() const { return worthless_; }
 
   // Share of these voxels that is still frontier.
   [[nodiscard]] double remaining_share(const std::vector<VoxelIndex>& voxels) const;
@@ -66,6 +68,7 @@ class FrontierFinder {
   std::map<std::uint32_t, ClusterPtr> members_;  // all clusters, too small ones as well
   std::uint32_t next_id_ = 2;                    // 0: no owner, 1: pooled
   std::vector<ClusterPtr> clusters_;
+  std::vector<ClusterPtr> worthless_;
 };
 
 }  // namespace understory

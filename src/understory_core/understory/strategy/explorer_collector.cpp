@@ -184,10 +184,11 @@ Candidate ExplorerCollector::far_view_of(const StrategyInput& input,
   return *far;
 }
 
-std::optional<Target> ExplorerCollector::choose(const StrategyInput& input) const {
+std::optional<Target> ExplorerCollector::choose(const StrategyInput& input) {
   const FlightMode mode = select_mode(input);
+  const bool is_greedy = mode == FlightMode::kCollector && !config_.mode.only_sets_pace;
   const std::optional<Candidate> candidate =
-      mode == FlightMode::kCollector ? choose_as_collector(input) : choose_as_explorer(input);
+      is_greedy ? choose_as_collector(input) : choose_as_explorer(input);
   if (!candidate) {
     return std::nullopt;
   }

@@ -16,6 +16,7 @@ struct ModeConfig {
   int min_near_trails = 1;
   double leave_factor = 1.25;
   double max_detour_s = 4.0;
+  bool only_sets_pace = false;
 
   void visit(FieldVisitor& f) {
     f.field("near_radius_m",
@@ -34,6 +35,10 @@ struct ModeConfig {
             max_detour_s,
             in_range(0.1, 1000.0),
             "a trail that costs a Collector more than this is no longer worth the detour");
+    f.field("only_sets_pace",
+            only_sets_pace,
+            "a Collector chooses its targets as an Explorer does, it is only faster; not in the "
+            "paper");
   }
 };
 
@@ -135,7 +140,7 @@ class ExplorerCollector final : public Strategy {
   ExplorerCollector(const ExplorerCollectorConfig& config, const TravelRates& rates)
       : config_(config), rates_(rates) {}
 
-  [[nodiscard]] std::optional<Target> choose(const StrategyInput& input) const override;
+  [[nodiscard]] std::optional<Target> choose(const StrategyInput& input) override;
 
   [[nodiscard]] FlightMode select_mode(const StrategyInput& input) const;
   [[nodiscard]] double explorer_cost(const StrategyInput& input, const Candidate& candidate) const;

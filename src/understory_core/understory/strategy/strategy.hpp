@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "understory/frontier/cluster.hpp"
+#include "understory/plan/clearance_map.hpp"
 #include "understory/plan/trajectory.hpp"
 
 namespace understory {
@@ -22,6 +23,7 @@ struct Candidate {
 };
 
 struct StrategyInput {
+  const ClearanceMap* map = nullptr;  // as long as the question is answered
   std::vector<Candidate> candidates;  // by cluster id, then best coverage first
   bool is_complete = false;  // false: only what is near was searched, more may be reachable
   TrajectoryPoint vehicle;   // where the next trajectory starts
@@ -42,8 +44,11 @@ class Strategy {
   virtual ~Strategy() = default;
 
   // Nothing: of these candidates none is worth flying to. If the input was not complete, the same
-  // question is asked again with all there is.
-  [[nodiscard]] virtual std::optional<Target> choose(const StrategyInput& input) const = 0;
+  // question is asked again with all there is. What a strategy remembers may make the next answer
+  // quicker, or depend on the last one.
+  [[nodiscard]] virtual std::optional<Target> choose(const StrategyInput& input) = 0;
+  // Has what is near only no answer?
+  [[nodiscard]] virtual bool needs_all() const { return false; }
 };
 
 }  // namespace understory

@@ -77,6 +77,10 @@ SimulationConfig load_scenario(const std::string& config_folder, const ScenarioC
   for (const char* concern : {"explorer.yaml", "vehicle.yaml"}) {
     load_config_file((fs::path(config_folder) / concern).string(), config);
   }
+  const fs::path settings = fs::path(config_folder) / "strategies" / (choice.strategy + ".yaml");
+  if (!choice.strategy.empty() && fs::exists(settings)) {
+    load_config_file(settings.string(), config);
+  }
   load_config_file(scenario_path(config_folder, choice.scenario), config);
   apply_choice(choice, config);
   return config;

@@ -44,7 +44,9 @@ ParsedOptions parse_options(int argc, char** argv) {
       "--crop", options.choice.crop, "X0,Y0,W,H: the piece of the stem map to fly, metres");
   app.add_option("--seed", options.seed, "of everything random")->capture_default_str();
   app.add_option(
-      "--strategy", options.choice.strategy, "how targets are chosen (explorer_collector)");
+      "--strategy",
+      options.choice.strategy,
+      "how targets are chosen, a name in config/strategies (default: explorer_collector)");
   app.add_option("--speed-cap", options.choice.speed_cap, "paper or strict");
   app.add_option("--resume", options.resume_file, "go on from a saved map (.ot, .bt)");
   app.add_option("--out", options.out_dir, "result folder (default: results/SCENARIO_SEED)");

@@ -1,0 +1,178 @@
+// Copyright 2026 the Understory authors
+// SPDX-License-Identifier: BSD-3-Clause
+#include "understory/strategy/open_tour.hpp"
+
+#include <algorithm>
+#include <array>
+
+namespace understory {
+namespace {
+
+constexpr double kLeastGain = 1e-9;  // so that rounding does not go round in circles
+constexpr std::size_t kLongestMoved = 3;
+constexpr std::size_t kKickedPlaces = 30;
+
+// A tour that is made shorter step by step. Positions count from 0; before the first one is the
+// beginning, after the last one nothing.
+class Improver {
+ public:
+  Improver(const TourCosts& costs, Tour tour) : costs_(costs), tour_(std::move(tour)) {}
+
+  [[nodiscard]] const Tour& tour() const { return tour_; }
+
+  void insert_cheapest(std::size_t place) {
+    std::size_t best = 0;
+    double least = detour(0, place);
+    for (std::size_t at = 1; at <= tour_.size(); ++at) {
+      const double cost = detour(at, place);
+      if (cost < least) {
+        least = cost;
+        best = at;
+      }
+    }
+    tour_.insert(tour_.begin() + static_cast<std::ptrdiff_t>(best), place);
+  }
+
+  // Until neither reversing a piece nor moving a short one helps, among the first `end` positions.
+  void improve(std::size_t end) {
+    bool is_better = true;
+    while (is_better) {
+      is_better = false;
+      for (std::size_t i = 0; i < end; ++i) {
+        is_better = reverse_from(i, end) || is_better;
+        for (std::size_t length = 1; length <= kLongestMoved && i + length <= end; ++length) {
+          is_better = move_from(i, length, end) || is_better;
+        }
+      }
+    }
+  }
+
+  // Swaps two neighbouring pieces at random.
+  void kick(std::size_t end, Rng& rng) {
+    std::array<std::size_t, 3> cuts{};
+    for (std::size_t& cut : cuts) {
+      cut = static_cast<std::size_t>(rng.below(end + 1));
+    }
+    std::sort(cuts.begin(), cuts.end());
+    const auto at = [this](std::size_t position) {
+      return tour_.begin() + static_cast<std::ptrdiff_t>(position);
+    };
+    std::rotate(at(cuts[0]), at(cuts[1]), at(cuts[2]));
+  }
+
+ private:
+  // The edge that leads to position `to` if `place` is there; none beyond the end.
+  [[nodiscard]] double edge(std::size_t to, std::size_t place) const {
+    return to == 0 ? costs_.first(place) : costs_.between(tour_[to - 1], place);
+  }
+  [[nodiscard]] double edge_from(std::size_t place, std::size_t to) const {
+    return to < tour_.size() ? costs_.between(place, tour_[to]) : 0.0;
+  }
+  [[nodiscard]] double edge_at(std::size_t to) const {
+    return to < tour_.size() ? edge(to, tour_[to]) : 0.0;
+  }
+  [[nodiscard]] double detour(std::size_t at, std::size_t place) const {
+    return edge(at, place) + edge_from(place, at) - edge_at(at);
+  }
+
+  bool reverse_from(std::size_t i, std::size_t end) {
+    bool is_better = false;
+    for (std::size_t j = i + 1; j < end; ++j) {
+      const double before = edge_at(i) + edge_at(j + 1);
+      const double after = edge(i, tour_[j]) + edge_from(tour_[i], j + 1);
+      if (after < before - kLeastGain) {
+        std::reverse(tour_.begin() + static_cast<std::ptrdiff_t>(i),
+                     tour_.begin() + static_cast<std::ptrdiff_t>(j + 1));
+        is_better = true;
+      }
+    }
+    return is_better;
+  }
+
+  // Takes the piece out and puts it, either way round, where it costs least.
+  bool move_from(std::size_t i, std::size_t length, std::size_t end) {
+    const std::size_t next = i + length;
+    const std::size_t head = tour_[i];
+    const std::size_t tail = tour_[next - 1];
+    const double closed = next < tour_.size() ? edge(i, tour_[next]) : 0.0;
+    const double saved = edge_at(i) + edge_at(next) - closed;
+    double best = saved - kLeastGain;
+    std::size_t best_at = i;
+    bool is_turned = false;
+    for (std::size_t at = 0; at <= end; ++at) {
+      if (at >= i && at <= next) {
+        continue;
+      }
+      const double opened = edge_at(at);
+      const double straight = edge(at, head) + edge_from(tail, at) - opened;
+      const double turned = edge(at, tail) + edge_from(head, at) - opened;
+      if (std::min(straight, turned) < best) {
+        best = std::min(straight, turned);
+        best_at = at;
+        is_turned = turned < straight;
+      }
+    }
+    if (best_at == i) {
+      return false;
+    }
+    const auto position = [this](std::size_t p) {
+      return tour_.begin() + static_cast<std::ptrdiff_t>(p);
+    };
+    if (is_turned) {
+      std::reverse(position(i), position(next));
+    }
+    if (best_at > next) {
+      std::rotate(position(i), position(next), position(best_at));
+    } else {
+      std::rotate(position(best_at), position(i), position(next));
+    }
+    return true;
+  }
+
+  const TourCosts& costs_;
+  Tour tour_;
+};
+
+}  // namespace
+
+double cost_of(const TourCosts& costs, const Tour& tour) {
+  double cost = tour.empty() ? 0.0 : costs.first(tour.front());
+  for (std::size_t i = 1; i < tour.size(); ++i) {
+    cost += costs.between(tour[i - 1], tour[i]);
+  }
+  return cost;
+}
+
+Tour short_open_tour(const TourCosts& costs, const Tour& hint, int kicks, Rng rng) {
+  std::vector<bool> is_in(costs.places(), false);
+  Tour begun;
+  for (const std::size_t place : hint) {
+    if (place < costs.places() && !is_in[place]) {
+      is_in[place] = true;
+      begun.push_back(place);
+    }
+  }
+  Improver first(costs, std::move(begun));
+  for (std::size_t place = 0; place < costs.places(); ++place) {
+    if (!is_in[place]) {
+      first.insert_cheapest(place);
+    }
+  }
+  first.improve(costs.places());
+  Tour best = first.tour();
+  double least = cost_of(costs, best);
+  const std::size_t end = std::min(costs.places(), kKickedPlaces);
+  for (int i = 0; i < kicks; ++i) {
+    Improver kicked(costs, best);
+    kicked.kick(end, rng);
+    kicked.improve(end);
+    const double cost = cost_of(costs, kicked.tour());
+    if (cost < least - kLeastGain) {
+      least = cost;
+      best = kicked.tour();
+    }
+  }
+  return best;
+}
+
+}  // namespace understory
