@@ -11,10 +11,15 @@ import sys
 import tempfile
 import unittest
 
+import numpy as np
+
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "src" / "understory_sim" / "bench"))
-from rows import COLUMNS, append_row, is_good, markdown, read_rows, row_of  # noqa: E402
-from table_file import Mission, TableError, read_table  # noqa: E402
+import bench_figures  # noqa: E402
+import series  # noqa: E402
+from rows import COLUMNS, append_row, comparison, is_good, markdown  # noqa: E402
+from rows import read_rows, row_of  # noqa: E402
+from table_file import Mission, TableError, quick, read_table  # noqa: E402
 
 
 class TemporaryFolder(unittest.TestCase):
@@ -62,6 +67,20 @@ class TableFiles(TemporaryFolder):
                 continue
             self.assertLessEqual({mission.scenario for mission in missions}, known)
 
+    def test_groups_have_their_own_seeds_strategies_and_titles(self):
+        path = self.write(
+            "t.yaml",
+            "groups:\n- {scenarios: [a, b], seeds: 2, strategies: [x, y], speed_caps: [paper]}\n"
+            "- {scenario: c, title: three}\n",
+        )
+        missions = read_table(path, self.folder)
+        self.assertEqual(len(missions), 8 + 2)
+        self.assertEqual(missions[0], Mission("a", "", 1, "paper", "x"))
+        self.assertEqual(missions[-1].title, "three")
+        self.assertEqual(missions[0].title, "a")
+        names = [f"{mission.scenario}{mission.strategy[0]}" for mission in quick(missions)]
+        self.assertEqual(names, ["ax", "ay", "bx", "by", "ce"])
+
     def test_bad_files_are_refused_with_file_and_key(self):
         for content, key in (
             ("scenario: a\nsede: 3\n", "sede"),
@@ -71,6 +90,9 @@ class TableFiles(TemporaryFolder):
             ("scenario: a\nforests: nowhere/*.csv\n", "forests"),
             ("seeds: 2\n", "scenario"),
             ("scenarios: [1]\n", "scenario"),
+            ("scenario: a\nstrategies: x\n", "strategies"),
+            ("groups: 3\n", "groups"),
+            ("groups: [{scenario: a, sede: 3}]\n", "sede"),
             ("- a\n", "expected keys"),
             ("a: [\n", "not YAML"),
         ):
@@ -99,12 +121,17 @@ RESULT = {
 }
 
 
+def key_of(scene):
+    """Of the row of its mission."""
+    return (scene, "1", "paper", "explorer_collector")
+
+
 class Rows(TemporaryFolder):
     """What is kept of a mission."""
 
-    def row(self, scene="f_s1", cap="paper", **changes):
+    def row(self, scene="f_s1", cap="paper", strategy="explorer_collector", **changes):
         (self.folder / "result.json").write_text(json.dumps(dict(RESULT, **changes)))
-        return row_of(Mission("a", f"{scene}.csv", 1, cap), self.folder, "", "abc")
+        return row_of(Mission("a", f"{scene}.csv", 1, cap, strategy), self.folder, "", "abc")
 
     def test_survive_the_file(self):
         path = self.folder / "rows.csv"
@@ -112,8 +139,8 @@ class Rows(TemporaryFolder):
         for row in (first, second):
             append_row(path, row)
         rows = read_rows(path)
-        self.assertEqual(list(rows), [("f_s1", "1", "paper"), ("f_s2", "1", "paper")])
-        self.assertEqual(rows["f_s1", "1", "paper"], first)
+        self.assertEqual(list(rows), [key_of("f_s1"), key_of("f_s2")])
+        self.assertEqual(rows[key_of("f_s1")], first)
         self.assertEqual(first["decision_p99_ms"], "9.0")
 
     def test_a_last_row_cut_short_is_flown_again(self):
@@ -121,7 +148,7 @@ class Rows(TemporaryFolder):
         append_row(path, self.row())
         with path.open("a", encoding="utf-8") as lines:
             lines.write("f_s2,1")
-        self.assertEqual(list(read_rows(path)), [("f_s1", "1", "paper")])
+        self.assertEqual(list(read_rows(path)), [key_of("f_s1")])
 
         append_row(path, self.row("f_s3"))
         self.assertEqual([key[0] for key in read_rows(path)], ["f_s1", "f_s3"])
@@ -147,11 +174,62 @@ class Rows(TemporaryFolder):
             self.row("f_s2", completion_time_s=120.0),
             self.row("f_s3", collisions=2, coverage=0.5),
         ]
-        lines = markdown(rows, lambda row: "f").splitlines()
+        lines = markdown(rows).splitlines()
         self.assertEqual(len(lines), 3)
         cells = [cell.strip() for cell in lines[2].split("|")]
-        self.assertEqual(cells[1:6], ["f", "paper", "3", "1", "110.0 ± 14.1"])
-        self.assertEqual(cells[8:10], ["50.00", "2"])
+        self.assertEqual(
+            cells[1:7], ["f", "paper", "explorer_collector", "3", "1", "110.0 ± 14.1"]
+        )
+        self.assertEqual(cells[9:11], ["50.00", "2"])
+
+    def test_comparison_is_of_mean_times_of_good_missions(self):
+        rows = [
+            self.row("f_s1"),
+            self.row("f_s2", completion_time_s=120.0),
+            self.row("f_s3", completion_time_s=9.0, collisions=1),
+            self.row("f_s1", strategy="fuel", completion_time_s=200.0),
+            self.row("f_s1", cap="strict", strategy="fuel", completion_time_s=200.0),
+        ]
+        lines = comparison(rows).splitlines()
+        self.assertEqual(lines[2], "| f | paper | 0.55 |")
+        self.assertEqual(lines[3], "| f | strict | - |")
+        self.assertEqual(comparison(rows[:2]), "")
+
+    def test_of_another_version_are_refused(self):
+        path = self.write("rows.csv", "scene,seed,speed_cap\na,1,paper\n")
+        with self.assertRaisesRegex(OSError, "another version"):
+            read_rows(path)
+
+
+TICKS = """time_s,x_m,y_m,z_m,coverage,clearance_m
+0.0,0,0,1,0.0,1
+0.5,0.5,0,1,,1
+1.0,1.0,0,1,0.5,1
+2.5,1.0,1.5,1,0.8,1
+3.0,1.0"""
+
+
+class Courses(TemporaryFolder):
+    """What is kept for the figures, and the figures."""
+
+    def test_are_sampled_at_whole_seconds_and_survive_the_file(self):
+        found = series.sampled(self.write("ticks.csv", TICKS))
+        path = self.folder / "m.csv"
+        series.write(path, found)
+        kept = series.read(path)
+        self.assertEqual([round(x, 4) for x in kept.coverage], [0.0, 0.5, 0.7])
+        self.assertEqual([round(x, 2) for x in kept.distance_m], [0.0, 1.0, 2.0])
+        self.assertIsNone(series.read(self.folder / "none.csv"))
+
+    def test_are_drawn_with_who_has_finished_staying_where_it_ended(self):
+        long = series.Series(np.linspace(0, 1, 101), np.linspace(0, 150, 101))
+        short = series.Series(np.linspace(0, 1, 51), np.linspace(0, 75, 51))
+        self.assertEqual(bench_figures.coverage_percent(short, 101)[-1], 100.0)
+        self.assertTrue(np.isnan(bench_figures.speed_mps(short, 101)[-1]))
+        self.assertAlmostEqual(bench_figures.speed_mps(long, 101)[50], 1.5)
+        groups = {("f", "paper", "a"): [long, short], ("f", "strict", "b"): [short]}
+        for path in bench_figures.write_figures(groups, self.folder):
+            self.assertGreater(path.stat().st_size, 10000)
 
 
 class Command(TemporaryFolder):

@@ -10,15 +10,16 @@ import argparse
 import concurrent.futures
 import os
 import pathlib
-import re
 import shutil
 import subprocess
 import sys
 import threading
 import time
 
-from rows import append_row, is_good, markdown, read_rows, row_of
-from table_file import TableError, read_table
+import series
+from bench_figures import write_figures
+from rows import KEY, append_row, comparison, grouped, is_good, markdown, read_rows, row_of
+from table_file import TableError, quick, read_table
 
 ROOT = pathlib.Path(os.environ["UNDERSTORY_ROOT"])
 SIMULATOR = ROOT / "build/src/understory_sim/understory_simulate"
@@ -34,6 +35,9 @@ def parse_arguments():
     parser.add_argument("--table", required=True, help="name in config/tables, or a YAML file")
     parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1, help="missions at once")
     parser.add_argument("--out", type=pathlib.Path, help="folder (default: results/bench/NAME)")
+    parser.add_argument(
+        "--quick", action="store_true", help="only the first mission of each scenario and strategy"
+    )
     parser.add_argument("--fresh", action="store_true", help="fly all again")
     parser.add_argument("--keep-folders", action="store_true", help="keep every result folder")
     arguments = parser.parse_args()
@@ -64,6 +68,10 @@ class Bench:
         self.interrupted = threading.Event()
         self.writing = threading.Lock()
 
+    def series_path(self, name):
+        """Of a mission's course."""
+        return self.folder / "series" / f"{name}.csv"
+
     def fly(self, mission):
         """The row of one mission, written at once; none if the bench was interrupted."""
         if self.interrupted.is_set():
@@ -71,6 +79,7 @@ class Bench:
         out = self.folder / "missions" / mission.name
         words = [str(SIMULATOR), "--scenario", mission.scenario, "--seed", str(mission.seed)]
         words += ["--speed-cap", mission.speed_cap, "--out", str(out), "--quiet", "--no-report"]
+        words += ["--strategy", mission.strategy]
         if mission.forest:
             words += ["--forest", mission.forest]
         done = subprocess.run(
@@ -80,6 +89,9 @@ class Bench:
         row = row_of(mission, out, said[0] if done.returncode == 2 and said else "", self.commit)
         if row["stop_reason"] == "interrupted":
             return None
+        ticks = out / "ticks.csv"
+        if ticks.exists():
+            series.write(self.series_path(mission.name), series.sampled(ticks))
         with self.writing:
             append_row(self.csv, row)
         if not self.keep_folders and is_good(row):
@@ -110,7 +122,7 @@ class Bench:
         left_min = elapsed_s / done * (total - done) / 60
         text = (
             f"{done} of {total} flown, {good} good, {left_min:.1f} minutes left; last: "
-            f"{row['scene']} {row['seed']} {row['speed_cap']}: "
+            f"{row['scene']} {row['seed']} {row['speed_cap']} {row['strategy']}: "
             f"{row['completion_time_s'] or row['stop_reason']}"
         )
         in_place = sys.stderr.isatty() and done < total
@@ -118,9 +130,20 @@ class Bench:
               end="" if in_place else "\n", file=sys.stderr, flush=True)
 
 
-def group_title(row):
-    """Forests that differ in their seed only share a line: forest_d005_s1 is one of forest_d005."""
-    return re.sub(r"_s\d+$", "", row["scene"])
+def report(bench, rows, folder):
+    """Writes and prints the tables, draws the figures."""
+    table = "\n".join(filter(None, [markdown(rows), comparison(rows)]))
+    (folder / "table.md").write_text(table, encoding="utf-8")
+    print(table, end="")
+    courses = {}
+    for group, members in grouped(rows).items():
+        found = [series.read(bench.series_path("_".join(row[key] for key in KEY)))
+                 for row in members]
+        courses[group] = [course for course in found if course is not None]
+    drawn = write_figures({group: found for group, found in courses.items() if found}, folder)
+    for what, path in (("rows", bench.csv), ("table", folder / "table.md"),
+                       *(("figure", path) for path in drawn)):
+        print(f"{what}: {path.resolve()}")
 
 
 def main():
@@ -129,6 +152,7 @@ def main():
     try:
         path = table_path(arguments.table)
         missions = read_table(path, ROOT)
+        missions = quick(missions) if arguments.quick else missions
     except TableError as error:
         print(f"understory bench: {error}", file=sys.stderr)
         return 2
@@ -136,23 +160,21 @@ def main():
     try:
         if arguments.fresh:
             shutil.rmtree(folder, ignore_errors=True)
-        (folder / "missions").mkdir(parents=True, exist_ok=True)
+        for name in ("missions", "series"):
+            (folder / name).mkdir(parents=True, exist_ok=True)
+        bench = Bench(folder, arguments.keep_folders)
+        flown = read_rows(bench.csv)
     except OSError as error:
         print(f"understory bench: {folder}: {error.strerror}", file=sys.stderr)
         return 2
-    bench = Bench(folder, arguments.keep_folders)
-    flown = read_rows(bench.csv)
     todo = [mission for mission in missions if mission.key not in flown]
     if len(todo) < len(missions):
         print(f"{len(missions) - len(todo)} of {len(missions)} are in {bench.csv} already "
               "(--fresh flies them again)", file=sys.stderr)
     finished = bench.fly_all(todo, arguments.jobs)
-    wanted = {mission.key for mission in missions}
-    rows = [row for key, row in sorted(read_rows(bench.csv).items()) if key in wanted]
-    table = markdown(rows, group_title)
-    (folder / "table.md").write_text(table, encoding="utf-8")
-    print(table, end="")
-    print(f"rows: {bench.csv.resolve()}\ntable: {(folder / 'table.md').resolve()}")
+    kept = read_rows(bench.csv)
+    rows = [kept[mission.key] for mission in missions if mission.key in kept]
+    report(bench, rows, folder)
     good = sum(is_good(row) for row in rows)
     print(f"{good} of {len(missions)} completed without collision")
     return 0 if finished and good == len(missions) else 1

@@ -3,10 +3,11 @@
 """The rows of a table: one per mission flown, kept in a CSV file that grows with every mission."""
 
 import csv
+import errno
 import json
 import statistics
 
-KEY = ["scene", "seed", "speed_cap"]
+KEY = ["scene", "seed", "speed_cap", "strategy"]
 MEASURED = [
     "completed",
     "stop_reason",
@@ -23,12 +24,12 @@ MEASURED = [
     "peak_rss_mb",
 ]
 DECISION = {"decision_p50_ms": "p50_ms", "decision_p99_ms": "p99_ms"}
-COLUMNS = KEY + ["commit", "error"] + MEASURED + list(DECISION)
+COLUMNS = KEY + ["title", "commit", "error"] + MEASURED + list(DECISION)
 
 
 def row_of(mission, folder, error, commit):
     """The row of a mission that was flown into this folder; `error` is what it said if it failed."""
-    row = dict(zip(KEY, mission.key), commit=commit, error=error)
+    row = dict(zip(KEY, mission.key), title=mission.title, commit=commit, error=error)
     try:
         result = json.loads((folder / "result.json").read_text(encoding="utf-8"))
     except (OSError, ValueError):
@@ -49,6 +50,8 @@ def _without_cut_row(path):
 def read_rows(path):
     """{key: row} of a file, empty if there is none. A last row cut short is left out."""
     rows = csv.DictReader(_without_cut_row(path).splitlines())
+    if rows.fieldnames not in (None, COLUMNS):
+        raise OSError(errno.EINVAL, "columns of another version (--fresh flies all again)")
     return {tuple(row[name] for name in KEY): row for row in rows}
 
 
@@ -82,22 +85,28 @@ def _worst(rows, name, worst, digits):
     return f"{worst(values):.{digits}f}" if values else "-"
 
 
-def markdown(rows, title_of):
-    """A table with one line per title and speed cap, in the order of first appearance."""
+def grouped(rows):
+    """{(title, speed cap, strategy): rows}, in the order of first appearance."""
     groups = {}
     for row in rows:
-        groups.setdefault((title_of(row), row["speed_cap"]), []).append(row)
+        groups.setdefault((row["title"], row["speed_cap"], row["strategy"]), []).append(row)
+    return groups
+
+
+def markdown(rows):
+    """A table with one line per group."""
     lines = [
-        "| scene | cap | n | failed | time s | distance m | mean m/s | least coverage % "
-        "| collisions | least clearance m |",
-        "|---|---|---|---|---|---|---|---|---|---|",
+        "| scene | cap | strategy | n | failed | time s | distance m | mean m/s | least coverage % "
+        "| collisions | least clearance m | decision p50 ms | p99 ms |",
+        "|---|---|---|---|---|---|---|---|---|---|---|---|---|",
     ]
-    for (title, cap), group in groups.items():
+    for (title, cap, strategy), group in grouped(rows).items():
         good = [row for row in group if is_good(row)]
         coverage = [dict(row, percent=100 * float(row["coverage"] or 0)) for row in group]
         cells = [
             title,
             cap,
+            strategy,
             str(len(group)),
             str(len(group) - len(good)),
             _mean(good, "completion_time_s", 1),
@@ -106,6 +115,32 @@ def markdown(rows, title_of):
             _worst(coverage, "percent", min, 2),
             str(sum(int(row["collisions"] or 0) for row in group)),
             _worst(group, "min_clearance_m", min, 2),
+            _mean(group, "decision_p50_ms", 1),
+            _worst(group, "decision_p99_ms", max, 1),
         ]
         lines.append("| " + " | ".join(cells) + " |")
+    return "\n".join(lines) + "\n"
+
+
+def comparison(rows):
+    """Mean completion times of the strategies as parts of the last one's; empty if there is one."""
+    groups = grouped(rows)
+    strategies = list(dict.fromkeys(strategy for _, _, strategy in groups))
+    if len(strategies) < 2:
+        return ""
+    base, others = strategies[-1], strategies[:-1]
+    lines = ["| scene | cap |" + "".join(f" {name} / {base} |" for name in others)]
+    lines.append("|---|---|" + "---|" * len(others))
+    for title, cap in dict.fromkeys((title, cap) for title, cap, _ in groups):
+        times = {
+            name: [float(row["completion_time_s"])
+                   for row in groups.get((title, cap, name), []) if is_good(row)]
+            for name in strategies
+        }
+        cells = [
+            f"{statistics.fmean(times[name]) / statistics.fmean(times[base]):.2f}"
+            if times[name] and times[base] else "-"
+            for name in others
+        ]
+        lines.append(f"| {title} | {cap} | " + " | ".join(cells) + " |")
     return "\n".join(lines) + "\n"

@@ -6,16 +6,22 @@
     forests: GLOB             stem maps instead of generated forests; relative to the project
     seeds: N                  seeds 1 .. N of each (default 1)
     speed_caps: [paper, strict]
+    title: TEXT               of the group's line in the table (default: one line per scene)
+    strategies: [NAME, ...]   of config/strategies (default: explorer_collector)
+
+or `groups:` a list of such groups.
 """
 
 import dataclasses
 import glob
 import itertools
 import pathlib
+import re
 
 import yaml
 
-KEYS = {"scenario", "scenarios", "forests", "seeds", "speed_caps"}
+KEYS = {"scenario", "scenarios", "forests", "seeds", "speed_caps", "strategies", "title"}
+DEFAULT_STRATEGY = "explorer_collector"
 SPEED_CAPS = ("paper", "strict")
 
 
@@ -31,6 +37,13 @@ class Mission:
     forest: str  # file, or empty: generated
     seed: int
     speed_cap: str
+    strategy: str = DEFAULT_STRATEGY
+    group: str = ""
+
+    @property
+    def title(self):
+        """Of its line in the table. Forests that differ in their seed only share one."""
+        return self.group or re.sub(r"_s\d+$", "", self.scene)
 
     @property
     def scene(self):
@@ -40,12 +53,12 @@ class Mission:
     @property
     def key(self):
         """As written in the columns of a row."""
-        return (self.scene, str(self.seed), self.speed_cap)
+        return (self.scene, str(self.seed), self.speed_cap, self.strategy)
 
     @property
     def name(self):
         """Of its result folder."""
-        return f"{self.scene}_{self.seed}_{self.speed_cap}"
+        return f"{self.scene}_{self.seed}_{self.speed_cap}_{self.strategy}"
 
 
 def _scenarios(path, content):
@@ -73,6 +86,35 @@ def _seed_count(path, content):
     return count
 
 
+def _strategies(path, content):
+    names = content.get("strategies", [DEFAULT_STRATEGY])
+    if not isinstance(names, list) or not names or not all(isinstance(n, str) for n in names):
+        raise TableError(f"{path}: strategies: expected a list of names")
+    return names
+
+
+def _group(path, content, root):
+    if not isinstance(content, dict):
+        raise TableError(f"{path}: expected keys and values")
+    for key in content:
+        if key not in KEYS:
+            known = ", ".join(sorted(KEYS | {"groups"}))
+            raise TableError(f"{path}: {key}: unknown key; there are: {known}")
+    caps = content.get("speed_caps", list(SPEED_CAPS))
+    if not isinstance(caps, list) or not caps or not set(caps) <= set(SPEED_CAPS):
+        raise TableError(f"{path}: speed_caps: expected a list of {', '.join(SPEED_CAPS)}")
+    return [
+        Mission(scenario, forest, seed, cap, strategy, content.get("title", ""))
+        for scenario, forest, seed, cap, strategy in itertools.product(
+            _scenarios(path, content),
+            _forests(path, content, root),
+            range(1, _seed_count(path, content) + 1),
+            caps,
+            _strategies(path, content),
+        )
+    ]
+
+
 def read_table(path, root):
     """The missions of a table file, in the order in which they are flown."""
     try:
@@ -81,20 +123,17 @@ def read_table(path, root):
         raise TableError(f"{path}: {error.strerror}") from error
     except (UnicodeDecodeError, yaml.YAMLError) as error:
         raise TableError(f"{path}: not YAML: {' '.join(str(error).split())}") from error
-    if not isinstance(content, dict):
-        raise TableError(f"{path}: expected keys and values")
-    for key in content:
-        if key not in KEYS:
-            raise TableError(f"{path}: {key}: unknown key; there are: {', '.join(sorted(KEYS))}")
-    caps = content.get("speed_caps", list(SPEED_CAPS))
-    if not isinstance(caps, list) or not caps or not set(caps) <= set(SPEED_CAPS):
-        raise TableError(f"{path}: speed_caps: expected a list of {', '.join(SPEED_CAPS)}")
-    return [
-        Mission(scenario, forest, seed, cap)
-        for scenario, forest, seed, cap in itertools.product(
-            _scenarios(path, content),
-            _forests(path, content, root),
-            range(1, _seed_count(path, content) + 1),
-            caps,
-        )
-    ]
+    groups = [content]
+    if isinstance(content, dict) and set(content) == {"groups"}:
+        groups = content["groups"]
+        if not isinstance(groups, list) or not groups:
+            raise TableError(f"{path}: groups: expected a list")
+    return [mission for group in groups for mission in _group(path, group, root)]
+
+
+def quick(missions):
+    """A taste of a table: of each scenario one forest and seed, as fast as allowed."""
+    first = {}
+    for mission in missions:
+        first.setdefault((mission.scenario, mission.strategy), mission)
+    return list(first.values())
