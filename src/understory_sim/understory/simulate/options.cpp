@@ -48,6 +48,9 @@ ParsedOptions parse_options(int argc, char** argv) {
       options.choice.strategy,
       "how targets are chosen, a name in config/strategies (default: explorer_collector)");
   app.add_option("--speed-cap", options.choice.speed_cap, "paper or strict");
+  app.add_option("--set",
+                 options.choice.overrides,
+                 "configuration (YAML) over that of all files, as 'camera: {rate_hz: 10}'");
   app.add_option("--resume", options.resume_file, "go on from a saved map (.ot, .bt)");
   app.add_option("--out", options.out_dir, "result folder (default: results/SCENARIO_SEED)");
   app.add_option("--bus-log",
