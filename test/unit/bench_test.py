@@ -3,6 +3,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Tables of missions: what is flown, what is kept, what is said of it, and bad table files."""
 
+import contextlib
+import io
 import json
 import os
 import pathlib
@@ -12,13 +14,15 @@ import tempfile
 import unittest
 
 import numpy as np
+import yaml
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "src" / "understory_sim" / "bench"))
 import bench_figures  # noqa: E402
 import series  # noqa: E402
-from rows import COLUMNS, append_row, comparison, is_good, markdown  # noqa: E402
-from rows import read_rows, row_of  # noqa: E402
+import spread  # noqa: E402
+from rows import COLUMNS, append_row, comparison, cost_of_variants  # noqa: E402
+from rows import is_good, markdown, read_rows, row_of  # noqa: E402
 from table_file import Mission, TableError, quick, read_table  # noqa: E402
 
 
@@ -81,6 +85,19 @@ class TableFiles(TemporaryFolder):
         names = [f"{mission.scenario}{mission.strategy[0]}" for mission in quick(missions)]
         self.assertEqual(names, ["ax", "ay", "bx", "by", "ce"])
 
+    def test_variants_have_settings_and_a_line_each(self):
+        path = self.write(
+            "t.yaml",
+            "scenario: a\nspeed_caps: [paper]\nvariants:\n  as it is: {}\n"
+            "  slow camera: {camera: {rate_hz: 5}}\n",
+        )
+        missions = read_table(path, self.folder)
+        self.assertEqual([mission.title for mission in missions], ["as it is", "slow camera"])
+        self.assertEqual(missions[0].settings, "")
+        self.assertEqual(yaml.safe_load(missions[1].settings), {"camera": {"rate_hz": 5}})
+        self.assertNotIn(" ", missions[1].name)
+        self.assertEqual(len({mission.name for mission in missions}), 2)
+
     def test_bad_files_are_refused_with_file_and_key(self):
         for content, key in (
             ("scenario: a\nsede: 3\n", "sede"),
@@ -91,6 +108,8 @@ class TableFiles(TemporaryFolder):
             ("seeds: 2\n", "scenario"),
             ("scenarios: [1]\n", "scenario"),
             ("scenario: a\nstrategies: x\n", "strategies"),
+            ("scenario: a\nvariants: [x]\n", "variants"),
+            ("scenario: a\nvariants: {x: 3}\n", "variants"),
             ("groups: 3\n", "groups"),
             ("groups: [{scenario: a, sede: 3}]\n", "sede"),
             ("- a\n", "expected keys"),
@@ -123,7 +142,7 @@ RESULT = {
 
 def key_of(scene):
     """Of the row of its mission."""
-    return (scene, "1", "paper", "explorer_collector")
+    return (scene, "1", "paper", "explorer_collector", "")
 
 
 class Rows(TemporaryFolder):
@@ -195,6 +214,18 @@ class Rows(TemporaryFolder):
         self.assertEqual(lines[3], "| f | strict | - |")
         self.assertEqual(comparison(rows[:2]), "")
 
+    def test_cost_of_variants_is_against_the_first(self):
+        rows = [
+            dict(self.row(), variant="as it is"),
+            dict(self.row(completion_time_s=125.0, coverage=0.9), variant="slow"),
+            dict(self.row(completed=False, completion_time_s=None), variant="blind"),
+        ]
+        lines = cost_of_variants(rows).splitlines()
+        self.assertEqual(lines[2], "| as it is | 1.00 | 99.50 | 0 of 1 |")
+        self.assertEqual(lines[3], "| slow | 1.25 | 90.00 | 0 of 1 |")
+        self.assertEqual(lines[4], "| blind | - | 99.50 | 1 of 1 |")
+        self.assertEqual(cost_of_variants(rows[:1]), "")
+
     def test_of_another_version_are_refused(self):
         path = self.write("rows.csv", "scene,seed,speed_cap\na,1,paper\n")
         with self.assertRaisesRegex(OSError, "another version"):
@@ -232,6 +263,29 @@ class Courses(TemporaryFolder):
             self.assertGreater(path.stat().st_size, 10000)
 
 
+class Elsewhere(TemporaryFolder):
+    """Missions that other machines fly."""
+
+    def test_survive_the_way_back(self):
+        course = series.Series(np.array([0.0, 0.5]), np.array([0.0, 1.5]))
+        row, back = spread.from_line(spread.line_of({"scene": "a"}, course))
+        self.assertEqual(row, {"scene": "a"})
+        self.assertEqual(list(back.coverage), [0.0, 0.5])
+        self.assertIsNone(spread.from_line(spread.line_of({"scene": "a"}, None))[1])
+
+    def test_are_run_by_parallel_and_what_is_no_mission_is_told(self):
+        script = self.write(
+            "fly.py",
+            "import sys\nprint('noise' if sys.argv[1] == 'b' else "
+            "'{\"row\": {\"scene\": \"%s\"}}' % sys.argv[1])\n",
+        )
+        said = io.StringIO()
+        with contextlib.redirect_stderr(said):
+            found = list(spread.fly(["a", "b", "c"], ":", 2, [sys.executable, str(script)]))
+        self.assertEqual(sorted(row["scene"] for row, _ in found), ["a", "c"])
+        self.assertIn("noise", said.getvalue())
+
+
 class Command(TemporaryFolder):
     """The command as a user meets it, without flying."""
 
@@ -251,6 +305,11 @@ class Command(TemporaryFolder):
         self.assertEqual(done.returncode, 2)
         self.assertEqual(len(done.stderr.splitlines()), 1)
         self.assertIn("generated", done.stderr)
+
+    def test_unknown_mission_is_one_line(self):
+        done = self.bench("--table", "generated", "--only", "nothing")
+        self.assertEqual(done.returncode, 2)
+        self.assertEqual(len(done.stderr.splitlines()), 1)
 
     def test_folder_that_cannot_be_written_is_found_at_start(self):
         self.write("occupied", "")

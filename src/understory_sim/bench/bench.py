@@ -17,9 +17,11 @@ import threading
 import time
 
 import series
+import spread
 from bench_figures import write_figures
-from rows import KEY, append_row, comparison, grouped, is_good, markdown, read_rows, row_of
-from table_file import TableError, quick, read_table
+from rows import KEY, append_row, comparison, cost_of_variants, grouped, is_good, markdown
+from rows import read_rows, row_of
+from table_file import TableError, name_of, quick, read_table
 
 ROOT = pathlib.Path(os.environ["UNDERSTORY_ROOT"])
 SIMULATOR = ROOT / "build/src/understory_sim/understory_simulate"
@@ -39,6 +41,12 @@ def parse_arguments():
         "--quick", action="store_true", help="only the first mission of each scenario and strategy"
     )
     parser.add_argument("--fresh", action="store_true", help="fly all again")
+    parser.add_argument(
+        "--hosts",
+        help="machines to share the missions, as GNU parallel's --sshlogin takes them "
+        "(host1,host2; ':' is this one); each has this project, built, at the same path",
+    )
+    parser.add_argument("--only", metavar="NAME", help="fly one mission and print it as JSON")
     parser.add_argument("--keep-folders", action="store_true", help="keep every result folder")
     arguments = parser.parse_args()
     if arguments.jobs < 1:
@@ -73,7 +81,7 @@ class Bench:
         return self.folder / "series" / f"{name}.csv"
 
     def fly(self, mission):
-        """The row of one mission, written at once; none if the bench was interrupted."""
+        """(row, course) of one mission; none if the bench was interrupted."""
         if self.interrupted.is_set():
             return None
         out = self.folder / "missions" / mission.name
@@ -82,6 +90,8 @@ class Bench:
         words += ["--strategy", mission.strategy]
         if mission.forest:
             words += ["--forest", mission.forest]
+        if mission.settings:
+            words += ["--set", mission.settings]
         done = subprocess.run(
             words, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, encoding="utf-8", check=False
         )
@@ -90,30 +100,56 @@ class Bench:
         if row["stop_reason"] == "interrupted":
             return None
         ticks = out / "ticks.csv"
-        if ticks.exists():
-            series.write(self.series_path(mission.name), series.sampled(ticks))
-        with self.writing:
-            append_row(self.csv, row)
+        course = series.sampled(ticks) if ticks.exists() else None
         if not self.keep_folders and is_good(row):
             shutil.rmtree(out, ignore_errors=True)
+        return row, course
+
+    def keep(self, flown):
+        """Writes what a mission was; its row."""
+        row, course = flown
+        with self.writing:
+            if course is not None:
+                series.write(self.series_path(name_of(row[key] for key in KEY)), course)
+            append_row(self.csv, row)
         return row
 
-    def fly_all(self, missions, jobs):
-        """Flies them and shows how far it is; true if it was not interrupted."""
-        began = time.monotonic()
-        good = 0
+    def fly_and_keep(self, mission):
+        """The row of one mission, written at once; none if the bench was interrupted."""
+        flown = self.fly(mission)
+        return None if flown is None else self.keep(flown)
+
+    def fly_here(self, missions, jobs):
+        """Yields their rows."""
         with concurrent.futures.ThreadPoolExecutor(jobs) as pool:
-            flights = [pool.submit(self.fly, mission) for mission in missions]
+            flights = [pool.submit(self.fly_and_keep, mission) for mission in missions]
             try:
-                for done, flight in enumerate(concurrent.futures.as_completed(flights), 1):
-                    row = flight.result()
-                    if row is None:
-                        continue
-                    good += is_good(row)
-                    self.show(row, done, len(missions), good, time.monotonic() - began)
+                for flight in concurrent.futures.as_completed(flights):
+                    if flight.result() is not None:
+                        yield flight.result()
             except KeyboardInterrupt:
                 self.interrupted.set()
                 print("\ninterrupted: waiting for the missions in flight", file=sys.stderr)
+
+    def fly_there(self, missions, jobs, hosts, table):
+        """Yields their rows; other machines fly them."""
+        words = ["env", f"UNDERSTORY_ROOT={ROOT}", f"UNDERSTORY_COMMIT={self.commit}"]
+        words += ["/usr/bin/python3", "-B", str(pathlib.Path(__file__).resolve())]
+        words += ["--out", str(self.folder.resolve()), "--table", str(table.resolve()), "--only"]
+        try:
+            for flown in spread.fly([mission.name for mission in missions], hosts, jobs, words):
+                yield self.keep(flown)
+        except KeyboardInterrupt:
+            self.interrupted.set()
+            print("\ninterrupted", file=sys.stderr)
+
+    def show_all(self, rows, total):
+        """Shows how far it is; true if it was not interrupted."""
+        began = time.monotonic()
+        good = 0
+        for done, row in enumerate(rows, 1):
+            good += is_good(row)
+            self.show(row, done, total, good, time.monotonic() - began)
         return not self.interrupted.is_set()
 
     @staticmethod
@@ -122,7 +158,7 @@ class Bench:
         left_min = elapsed_s / done * (total - done) / 60
         text = (
             f"{done} of {total} flown, {good} good, {left_min:.1f} minutes left; last: "
-            f"{row['scene']} {row['seed']} {row['speed_cap']} {row['strategy']}: "
+            f"{' '.join(filter(None, (row[key] for key in KEY)))}: "
             f"{row['completion_time_s'] or row['stop_reason']}"
         )
         in_place = sys.stderr.isatty() and done < total
@@ -132,18 +168,29 @@ class Bench:
 
 def report(bench, rows, folder):
     """Writes and prints the tables, draws the figures."""
-    table = "\n".join(filter(None, [markdown(rows), comparison(rows)]))
+    table = "\n".join(filter(None, [markdown(rows), comparison(rows), cost_of_variants(rows)]))
     (folder / "table.md").write_text(table, encoding="utf-8")
     print(table, end="")
     courses = {}
     for group, members in grouped(rows).items():
-        found = [series.read(bench.series_path("_".join(row[key] for key in KEY)))
+        found = [series.read(bench.series_path(name_of(row[key] for key in KEY)))
                  for row in members]
         courses[group] = [course for course in found if course is not None]
     drawn = write_figures({group: found for group, found in courses.items() if found}, folder)
     for what, path in (("rows", bench.csv), ("table", folder / "table.md"),
                        *(("figure", path) for path in drawn)):
         print(f"{what}: {path.resolve()}")
+
+
+def fly_only(name, missions, bench):
+    """One mission, for who asked for it from another machine; returns the exit status."""
+    chosen = [mission for mission in missions if mission.name == name]
+    if not chosen:
+        print(f"understory bench: --only {name}: no such mission in the table", file=sys.stderr)
+        return 2
+    flown = bench.fly(chosen[0])
+    print(spread.line_of(*flown))
+    return 0 if is_good(flown[0]) else 1
 
 
 def main():
@@ -163,6 +210,8 @@ def main():
         for name in ("missions", "series"):
             (folder / name).mkdir(parents=True, exist_ok=True)
         bench = Bench(folder, arguments.keep_folders)
+        if arguments.only:
+            return fly_only(arguments.only, missions, bench)
         flown = read_rows(bench.csv)
     except OSError as error:
         print(f"understory bench: {folder}: {error.strerror}", file=sys.stderr)
@@ -171,7 +220,16 @@ def main():
     if len(todo) < len(missions):
         print(f"{len(missions) - len(todo)} of {len(missions)} are in {bench.csv} already "
               "(--fresh flies them again)", file=sys.stderr)
-    finished = bench.fly_all(todo, arguments.jobs)
+    try:
+        rows = (
+            bench.fly_there(todo, arguments.jobs, arguments.hosts, path)
+            if arguments.hosts
+            else bench.fly_here(todo, arguments.jobs)
+        )
+        finished = bench.show_all(rows, len(todo))
+    except OSError as error:
+        print(f"understory bench: {error}", file=sys.stderr)
+        return 2
     kept = read_rows(bench.csv)
     rows = [kept[mission.key] for mission in missions if mission.key in kept]
     report(bench, rows, folder)

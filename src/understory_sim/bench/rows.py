@@ -7,7 +7,7 @@ import errno
 import json
 import statistics
 
-KEY = ["scene", "seed", "speed_cap", "strategy"]
+KEY = ["scene", "seed", "speed_cap", "strategy", "variant"]
 MEASURED = [
     "completed",
     "stop_reason",
@@ -143,4 +143,27 @@ def comparison(rows):
             for name in others
         ]
         lines.append(f"| {title} | {cap} | " + " | ".join(cells) + " |")
+    return "\n".join(lines) + "\n"
+
+
+def cost_of_variants(rows):
+    """Mean completion times as parts of the first variant's; empty if there are none."""
+    variants = list(dict.fromkeys(row["variant"] for row in rows))
+    if len(variants) < 2:
+        return ""
+    lines = [f"| variant | time / {variants[0]} | least coverage % | not completed |",
+             "|---|---|---|---|"]
+    first = [row for row in rows if row["variant"] == variants[0] and is_good(row)]
+    for variant in variants:
+        members = [row for row in rows if row["variant"] == variant]
+        good = [row for row in members if is_good(row)]
+        ratio = "-"
+        if good and first:
+            times = [statistics.fmean(float(row["completion_time_s"]) for row in group)
+                     for group in (good, first)]
+            ratio = f"{times[0] / times[1]:.2f}"
+        least = min(100 * float(row["coverage"] or 0) for row in members)
+        lines.append(
+            f"| {variant} | {ratio} | {least:.2f} | {len(members) - len(good)} of {len(members)} |"
+        )
     return "\n".join(lines) + "\n"

@@ -8,6 +8,7 @@
     speed_caps: [paper, strict]
     title: TEXT               of the group's line in the table (default: one line per scene)
     strategies: [NAME, ...]   of config/strategies (default: explorer_collector)
+    variants: {NAME: {...}}   configuration over that of all files; one line in the table per variant
 
 or `groups:` a list of such groups.
 """
@@ -20,13 +21,18 @@ import re
 
 import yaml
 
-KEYS = {"scenario", "scenarios", "forests", "seeds", "speed_caps", "strategies", "title"}
+KEYS = {"scenario", "scenarios", "forests", "seeds", "speed_caps", "strategies", "title", "variants"}
 DEFAULT_STRATEGY = "explorer_collector"
 SPEED_CAPS = ("paper", "strict")
 
 
 class TableError(Exception):
     """A table that cannot be flown; the message names file and key."""
+
+
+def name_of(key):
+    """Of a mission with these columns, for files."""
+    return re.sub(r"[^\w.+-]+", "-", "_".join(word for word in key if word))
 
 
 @dataclasses.dataclass(frozen=True)
@@ -39,11 +45,13 @@ class Mission:
     speed_cap: str
     strategy: str = DEFAULT_STRATEGY
     group: str = ""
+    variant: str = ""
+    settings: str = ""  # the variant's, as YAML
 
     @property
     def title(self):
         """Of its line in the table. Forests that differ in their seed only share one."""
-        return self.group or re.sub(r"_s\d+$", "", self.scene)
+        return self.group or self.variant or re.sub(r"_s\d+$", "", self.scene)
 
     @property
     def scene(self):
@@ -53,12 +61,12 @@ class Mission:
     @property
     def key(self):
         """As written in the columns of a row."""
-        return (self.scene, str(self.seed), self.speed_cap, self.strategy)
+        return (self.scene, str(self.seed), self.speed_cap, self.strategy, self.variant)
 
     @property
     def name(self):
         """Of its result folder."""
-        return f"{self.scene}_{self.seed}_{self.speed_cap}_{self.strategy}"
+        return name_of(self.key)
 
 
 def _scenarios(path, content):
@@ -93,6 +101,18 @@ def _strategies(path, content):
     return names
 
 
+def _variants(path, content):
+    """(name, settings as YAML) of each; one without a name if the table has none."""
+    variants = content.get("variants", {"": {}})
+    is_map = isinstance(variants, dict) and variants
+    if not is_map or not all(isinstance(settings, dict) for settings in variants.values()):
+        raise TableError(f"{path}: variants: expected names with configuration below them")
+    return [
+        (str(name), yaml.safe_dump(settings, default_flow_style=True) if settings else "")
+        for name, settings in variants.items()
+    ]
+
+
 def _group(path, content, root):
     if not isinstance(content, dict):
         raise TableError(f"{path}: expected keys and values")
@@ -104,8 +124,9 @@ def _group(path, content, root):
     if not isinstance(caps, list) or not caps or not set(caps) <= set(SPEED_CAPS):
         raise TableError(f"{path}: speed_caps: expected a list of {', '.join(SPEED_CAPS)}")
     return [
-        Mission(scenario, forest, seed, cap, strategy, content.get("title", ""))
-        for scenario, forest, seed, cap, strategy in itertools.product(
+        Mission(scenario, forest, seed, cap, strategy, content.get("title", ""), *variant)
+        for variant, scenario, forest, seed, cap, strategy in itertools.product(
+            _variants(path, content),
             _scenarios(path, content),
             _forests(path, content, root),
             range(1, _seed_count(path, content) + 1),
@@ -135,5 +156,5 @@ def quick(missions):
     """A taste of a table: of each scenario one forest and seed, as fast as allowed."""
     first = {}
     for mission in missions:
-        first.setdefault((mission.scenario, mission.strategy), mission)
+        first.setdefault((mission.scenario, mission.strategy, mission.variant), mission)
     return list(first.values())
