@@ -178,10 +178,12 @@ TEST(Mission, TimeLimitEndsTheMissionAtRest) {
   EXPECT_EQ(result.collisions, 0U);
 }
 
-TEST(Mission, NoisyDepthAndWindHurtNobody) {
+TEST(Mission, NoisyDepthAndOdometryAndWindHurtNobody) {
   SimulationConfig config = square_scene(5.0, 0.10);
   config.depth_noise.deviation_at_1m_m = 0.002;
   config.depth_noise.dropout_probability = 0.02;
+  config.odometry_noise.position_deviation_m = 0.02;
+  config.odometry_noise.yaw_deviation_rad = 0.005;
   config.vehicle.wind.mean_x_mps = 1.5;
   config.vehicle.wind.gust_deviation_mps = 0.4;
 

@@ -23,6 +23,13 @@ Mapper make_mapper(const SimulationConfig& config, const MapSnapshot* resumed) {
                             : Mapper(config.explorer.map, config.scene.box.box_m());
 }
 
+Pose world_from_body(const VehicleState& state) {
+  Pose pose = Pose::Identity();
+  pose.translation() = state.position_m;
+  pose.linear() = state.world_from_body.toRotationMatrix();
+  return pose;
+}
+
 }  // namespace
 
 Lockstep::Stages::Stages(StageTimes& times)
@@ -119,14 +126,11 @@ LockstepFrame Lockstep::advance() {
     const StageTimer timer(times_, stages_.flight);
     fly_until(exposure);
   }
-  Pose world_from_body = Pose::Identity();
-  world_from_body.translation() = vehicle().position_m;
-  world_from_body.linear() = vehicle().world_from_body.toRotationMatrix();
-  const Pose world_from_optical = world_from_body * body_from_optical_;
   {
     const StageTimer timer(times_, stages_.camera);
-    image_ = expose(world_from_optical);
+    image_ = expose(world_from_body(vehicle()) * body_from_optical_);
   }
+  const Pose world_from_optical = world_from_body(bus_.vehicle().odometry()) * body_from_optical_;
   LockstepFrame frame;
   frame.time = now_;
   {

@@ -50,6 +50,7 @@ class Lockstep {
 
   [[nodiscard]] Time now() const { return now_; }
   [[nodiscard]] const Mission& mission() const { return mission_; }
+  // The truth.
   [[nodiscard]] const VehicleState& vehicle() const { return bus_.vehicle().state(); }
   // Sees every frame on the bus.
   void set_tap(std::shared_ptr<can::FrameTap> tap) { bus_.host().node().set_tap(std::move(tap)); }

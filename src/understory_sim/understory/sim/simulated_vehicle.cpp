@@ -29,6 +29,7 @@ SimulatedVehicle::SimulatedVehicle(const SimulatedVehicleConfig& config,
                world_from_start.translation(),
                yaw_of(Eigen::Quaterniond(world_from_start.linear())),
                rng.fork("wind")),
+      odometry_(config.odometry_noise, rng.fork("odometry")),
       power_(config.power, config.vehicle.airframe.max_motor_thrust_n),
       station_(station_config(config), rng.fork("autopilot")) {
   vehicle_.hang_in_launcher();
@@ -45,7 +46,7 @@ void SimulatedVehicle::restart_autopilot(const Rng& rng) {
 
 can::VehicleReadings SimulatedVehicle::readings() const {
   can::VehicleReadings readings;
-  readings.state = vehicle_.state();
+  readings.state = odometry();
   readings.is_on_ground = vehicle_.on_ground();
   readings.has_sensors = has_sensors_;
   readings.escs = power_.escs();
@@ -67,6 +68,7 @@ void SimulatedVehicle::step(Time now) {
     commands[i] = has_failed_[i] ? 0.0 : commands[i];
   }
   vehicle_.step(commands, step_s);
+  odometry_.step(step_s);
   power_.step(vehicle_.motor_thrusts_n(), step_s);
   station_.send_due(readings(), now, node_);
   poll();

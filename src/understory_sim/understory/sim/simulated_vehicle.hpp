@@ -12,6 +12,7 @@
 #include <memory>
 
 #include "understory/port/can_node.hpp"
+#include "understory/sim/odometry_noise.hpp"
 #include "understory/sim/power_train.hpp"
 #include "understory/sim/vehicle.hpp"
 
@@ -22,6 +23,7 @@ struct SimulatedVehicleConfig {
   ControlConfig control;
   PowerConfig power;
   can::SupervisorConfig supervisor;
+  OdometryNoiseConfig odometry_noise;
   double telemetry_rate_hz = 100.0;
   bool is_direct = false;  // no autopilot between host and ESCs
 };
@@ -30,7 +32,7 @@ class SimulatedVehicle : private can::FrameHandler {
  public:
   static constexpr Duration kStep = std::chrono::milliseconds(2);
 
-  // `rng`: of the wind and of the autopilot's chance.
+  // `rng`: of the wind, of the odometry's errors and of the autopilot's chance.
   SimulatedVehicle(const SimulatedVehicleConfig& config,
                    const Pose& world_from_start,
                    const Rng& rng,
@@ -54,6 +56,8 @@ class SimulatedVehicle : private can::FrameHandler {
   void restart_autopilot(const Rng& rng);
 
   [[nodiscard]] const VehicleState& state() const { return vehicle_.state(); }
+  // What the vehicle takes its state to be.
+  [[nodiscard]] VehicleState odometry() const { return odometry_.measured(vehicle_.state()); }
   [[nodiscard]] const can::VehicleStation& station() const { return station_; }
   [[nodiscard]] const PowerTrain& power() const { return power_; }
   [[nodiscard]] can::CanNode& node() { return node_; }
@@ -65,6 +69,7 @@ class SimulatedVehicle : private can::FrameHandler {
   SimulatedVehicleConfig config_;
   can::CanNode node_;
   Vehicle vehicle_;
+  OdometryNoise odometry_;
   PowerTrain power_;
   can::VehicleStation station_;
   std::array<bool, 4> has_failed_{};

@@ -49,6 +49,7 @@ SimulatedVehicleConfig vehicle_of(const SimulationConfig& config) {
   vehicle.control = config.control;
   vehicle.power = config.power;
   vehicle.supervisor = config.autopilot;
+  vehicle.odometry_noise = config.odometry_noise;
   return vehicle;
 }
 

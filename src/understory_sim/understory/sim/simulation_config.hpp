@@ -106,6 +106,7 @@ struct SimulationConfig {
   ControlConfig control;
   PowerConfig power;
   can::SupervisorConfig autopilot;
+  OdometryNoiseConfig odometry_noise;
   DepthNoiseConfig depth_noise;
   ExplorerConfig explorer;
 
@@ -116,6 +117,7 @@ struct SimulationConfig {
     f.section("control", control, "The autopilot's control law.");
     f.section("power", power, "ESCs and battery of the true vehicle.");
     f.section("autopilot", autopilot, "What the autopilot makes of silence and odd setpoints.");
+    f.section("odometry_noise", odometry_noise, "What the simulated odometry does wrong.");
     f.section("depth_noise", depth_noise, "What the simulated camera does wrong.");
     explorer.visit(f);
   }
