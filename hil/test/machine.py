@@ -23,9 +23,12 @@ LATE_S = 0.004  # of a wake-up
 GAP_S = 0.03  # one alone is trouble
 HOPELESS_S = 0.2
 MOST_LATE = 0.01  # of the time
+HOPELESSLY_LATE = 0.1
 LEAST_IDLE = 0.05  # of the processor's time
 ATTEMPTS = 3
 ATTEMPT_PATIENCE_S = 120
+CALM_S = 3
+CALM_TRIES = 10  # before another attempt
 
 
 def watch() -> None:
@@ -80,18 +83,26 @@ class Machine:
         idle, everything = (now - then for now, then in zip(self._times(), self._begin))
         return idle / max(1, everything)
 
+    def part_late(self) -> float:
+        """Of the time, 0 to 1."""
+        late_s = sum(end - begin for begin, end in self.gaps())
+        return late_s / max(NAP_S, time.time() - self._began_s)
+
+    def _longest_s(self) -> float:
+        return max((end - begin for begin, end in self.gaps()), default=0.0)
+
     def is_hopeless(self) -> bool:
-        """It stood still for longer than a vehicle waits, or had nothing left to give."""
-        longest_s = max((end - begin for begin, end in self.gaps()), default=0.0)
-        return longest_s > HOPELESS_S or self._idle() < LEAST_IDLE
+        """It stood still for longer than a vehicle waits or for much of the time, or had nothing
+        left to give."""
+        if self._longest_s() > HOPELESS_S or self.part_late() > HOPELESSLY_LATE:
+            return True
+        return self._idle() < LEAST_IDLE
 
     def trouble(self) -> str:
         """Empty: it was as fast as one may ask for."""
-        gaps = self.gaps()
-        total_s, longest_s = (f([end - begin for begin, end in gaps] or [0.0]) for f in (sum, max))
-        if longest_s > GAP_S or total_s > MOST_LATE * (time.time() - self._began_s):
-            text = f"the machine stood still {len(gaps)} times"
-            return f"{text}, for {1e3 * longest_s:.0f} ms at most"
+        if self._longest_s() > GAP_S or self.part_late() > MOST_LATE:
+            often = f"{len(self.gaps())} times, {100 * self.part_late():.0f} % of the time"
+            return f"the machine stood still {often}, for {1e3 * self._longest_s():.0f} ms at most"
         if self._idle() < LEAST_IDLE:
             return f"the machine had too little time: {100 * self._idle():.0f} % idle"
         return ""
@@ -101,6 +112,18 @@ class Never(AssertionError):
     """What no machine is slow enough for: too early, armed, flown, killed without a reason."""
 
 
+def wait_for_calm() -> None:
+    """A machine that was too slow often stays so for a while."""
+    for _ in range(CALM_TRIES):
+        machine = Machine()
+        time.sleep(CALM_S)
+        trouble = machine.trouble()
+        machine.close()
+        if not trouble:
+            return
+        print(f"    waiting for a calm machine: {trouble}", flush=True)
+
+
 def tried_again(test: Callable[[Any], None]) -> Callable[[Any], None]:
     """A failure counts if the machine was fast enough meanwhile; else the test is done again. The
     last one counts too, but where nothing could have been tested: that is skipped."""
@@ -108,8 +131,11 @@ def tried_again(test: Callable[[Any], None]) -> Callable[[Any], None]:
     @functools.wraps(test)
     def tried(self: Any) -> None:
         for attempt in range(1, ATTEMPTS + 1):
+            runners = signal.alarm(0)
+            if attempt > 1:
+                wait_for_calm()
             machine = self.machine = Machine()
-            signal.alarm(signal.alarm(0) and ATTEMPT_PATIENCE_S)  # the runner's, for each anew
+            signal.alarm(runners and ATTEMPT_PATIENCE_S)  # for each anew
             try:
                 if attempt > 1:
                     self.setUp()
