@@ -20,6 +20,7 @@ constexpr double kDirectionRad = 2.0 * kPi / kDirections;
 constexpr double kRateShare = 0.9;  // the rest is for gaining and losing it
 // Of what a step shows on average at best, so that the camera does not turn for nothing.
 constexpr double kTurnCost = 0.01;
+constexpr std::size_t kLeastSteps = 3;
 constexpr double kNever = -std::numeric_limits<double>::infinity();
 
 // One number for each direction.
@@ -37,24 +38,27 @@ double yaw_of_direction(std::size_t direction) {
   return static_cast<double>(direction) * kDirectionRad;
 }
 
-void add_sight(const ClearanceMap& map,
-               const Sight& sight,
-               const std::vector<Vector3d>& path_m,
-               const LookConfig& config,
-               std::vector<ByDirection>& shown) {
-  std::vector<std::pair<std::size_t, double>> seen;  // from which step, and its bearing
-  for (std::size_t step = 0; step < path_m.size(); ++step) {
-    const Vector3d line_m = sight.at_m - path_m[step];
-    if (line_m.norm() <= config.max_range_m && line_is_free(map, path_m[step], sight.at_m)) {
-      seen.emplace_back(step, std::atan2(line_m.y(), line_m.x()));
-    }
-  }
-  for (const auto& [step, bearing_rad] : seen) {
+double step_s_of(const Trajectory& flown) {
+  return kDirectionRad / (kRateShare * flown.limits.yaw_rate_radps);
+}
+
+std::size_t steps_of(const Trajectory& flown, const LookConfig& config) {
+  const double time_s = std::max(0.0, flown.position.duration_s() - config.spare_s);
+  return static_cast<std::size_t>(time_s / step_s_of(flown)) + 1;
+}
+
+// In the first so many steps.
+void add_sight(const SeenSight& seen, const LookConfig& config, std::vector<ByDirection>& shown) {
+  const auto end = std::find_if(seen.from.begin(), seen.from.end(), [&](const auto& glimpse) {
+    return glimpse.step >= shown.size();
+  });
+  const auto often = static_cast<double>(end - seen.from.begin());
+  for (auto glimpse = seen.from.begin(); glimpse != end; ++glimpse) {
     for (std::size_t direction = 0; direction < kDirections; ++direction) {
-      const double aside_rad = angle_difference(yaw_of_direction(direction), bearing_rad);
+      const double aside_rad = angle_difference(yaw_of_direction(direction), glimpse->bearing_rad);
       if (std::abs(aside_rad) <= config.half_field_rad) {
         // Once is enough, whenever that is.
-        shown[step][direction] += sight.weight / static_cast<double>(seen.size());
+        shown[glimpse->step][direction] += seen.weight / often;
       }
     }
   }
@@ -108,24 +112,46 @@ std::vector<std::size_t> best_directions(const std::vector<ByDirection>& shown,
 
 }  // namespace
 
-std::optional<CubicBSpline<double>> looking_yaw(const ClearanceMap& map,
-                                                const std::vector<Sight>& sights,
-                                                const Trajectory& flown,
-                                                const LookConfig& config) {
-  const double step_s = kDirectionRad / (kRateShare * flown.limits.yaw_rate_radps);
-  const double time_s = std::max(0.0, flown.position.duration_s() - config.spare_s);
-  const auto steps = static_cast<std::size_t>(time_s / step_s) + 1;
-  if (sights.empty() || steps < 3) {
-    return std::nullopt;
+std::vector<SeenSight> seen_on_the_way(const ClearanceMap& map,
+                                       const std::vector<Sight>& sights,
+                                       const Trajectory& flown,
+                                       const LookConfig& config) {
+  const std::size_t steps = steps_of(flown, config);
+  if (sights.empty() || steps < kLeastSteps) {
+    return {};
   }
   std::vector<Vector3d> path_m;
   path_m.reserve(steps);
   for (std::size_t step = 0; step < steps; ++step) {
-    path_m.push_back(flown.position.sample(static_cast<double>(step) * step_s).value);
+    const double time_s = static_cast<double>(step) * step_s_of(flown);
+    path_m.push_back(flown.position.sample(time_s).value);
+  }
+  std::vector<SeenSight> all;
+  for (const Sight& sight : sights) {
+    SeenSight seen{sight.weight, {}};
+    for (std::size_t step = 0; step < steps; ++step) {
+      const Vector3d line_m = sight.at_m - path_m[step];
+      if (line_m.norm() <= config.max_range_m && line_is_free(map, path_m[step], sight.at_m)) {
+        seen.from.push_back({step, std::atan2(line_m.y(), line_m.x())});
+      }
+    }
+    if (!seen.from.empty()) {
+      all.push_back(std::move(seen));
+    }
+  }
+  return all;
+}
+
+std::optional<CubicBSpline<double>> looking_yaw(const std::vector<SeenSight>& seen,
+                                                const Trajectory& flown,
+                                                const LookConfig& config) {
+  const std::size_t steps = steps_of(flown, config);
+  if (seen.empty() || steps < kLeastSteps) {
+    return std::nullopt;
   }
   std::vector<ByDirection> shown(steps, ByDirection{});
-  for (const Sight& sight : sights) {
-    add_sight(map, sight, path_m, config, shown);
+  for (const SeenSight& sight : seen) {
+    add_sight(sight, config, shown);
   }
   const CubicBSpline<double>::Sample begin = flown.yaw.sample(0.0);
   const double end_rad = flown.yaw.control_points.back();
@@ -134,7 +160,7 @@ std::optional<CubicBSpline<double>> looking_yaw(const ClearanceMap& map,
   if (directions.empty()) {
     return std::nullopt;
   }
-  YawCourse course{{begin.value}, step_s};
+  YawCourse course{{begin.value}, step_s_of(flown)};
   for (std::size_t step = 1; step < steps; ++step) {
     const double before_rad = course.yaw_rad.back();
     course.yaw_rad.push_back(before_rad +

@@ -8,6 +8,7 @@
 // since a sphere has no front.
 #pragma once
 
+#include <cstddef>
 #include <optional>
 #include <vector>
 
@@ -44,9 +45,24 @@ struct Sight {
   double weight = 1.0;
 };
 
-// Nothing: there is nothing to see on the way, or no time for it.
-[[nodiscard]] std::optional<CubicBSpline<double>> looking_yaw(const ClearanceMap& map,
-                                                              const std::vector<Sight>& sights,
+// A sight that can be seen on the way.
+struct SeenSight {
+  struct Glimpse {
+    std::size_t step = 0;
+    double bearing_rad = 0.0;
+  };
+  double weight = 1.0;
+  std::vector<Glimpse> from;  // by step
+};
+
+[[nodiscard]] std::vector<SeenSight> seen_on_the_way(const ClearanceMap& map,
+                                                     const std::vector<Sight>& sights,
+                                                     const Trajectory& flown,
+                                                     const LookConfig& config);
+
+// Nothing: there is nothing to see on the way, or no time for it. `config` may spare more time than
+// the one by which the sights were seen.
+[[nodiscard]] std::optional<CubicBSpline<double>> looking_yaw(const std::vector<SeenSight>& seen,
                                                               const Trajectory& flown,
                                                               const LookConfig& config);
 

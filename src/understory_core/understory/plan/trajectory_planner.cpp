@@ -209,11 +209,11 @@ Trajectory TrajectoryPlanner::looking(const ClearanceMap& map,
   }
   const double longest_s = std::max(planned.position.duration_s(), planned.yaw.duration_s());
   LookConfig config = config_.look;
+  const std::vector<SeenSight> seen = seen_on_the_way(map, request.sights, planned, config);
   // The camera lags behind the course that it is given, the more the more it turns.
   for (const double lag_s : {0.0, 0.5, 1.0}) {
     config.spare_s = config_.look.spare_s + lag_s;
-    const std::optional<CubicBSpline<double>> yaw =
-        looking_yaw(map, request.sights, planned, config);
+    const std::optional<CubicBSpline<double>> yaw = looking_yaw(seen, planned, config);
     if (!yaw) {
       return planned;
     }
