@@ -163,7 +163,10 @@ void Explorer::measure(const Pilot& pilot, Reach reach, StrategyInput& input) {
   }
   const double max_length_m = reach < Reach::kAll ? config_.replan.near_route_m : kUnreachable;
   RouteSearch& routes = reach == Reach::kThroughTightGaps ? tight_routes_ : routes_;
-  routes.run(pilot.clearance(), input.vehicle.position_m, nodes, max_length_m);
+  const bool was_asked_near = reach == Reach::kFar && !strategy_->needs_all();
+  if (!was_asked_near) {
+    routes.run(pilot.clearance(), input.vehicle.position_m, nodes, max_length_m);
+  }
   for (Candidate& candidate : input.candidates) {
     candidate.route_length_m = routes.length_m(candidate.viewpoint.node).value_or(kUnreachable);
   }

@@ -47,7 +47,7 @@ class Strategy {
   // question is asked again with all there is. What a strategy remembers may make the next answer
   // quicker, or depend on the last one.
   [[nodiscard]] virtual std::optional<Target> choose(const StrategyInput& input) = 0;
-  // Has what is near only no answer?
+  // What is near only is never worth asking about.
   [[nodiscard]] virtual bool needs_all() const { return false; }
 };
 
