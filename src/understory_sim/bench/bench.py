@@ -189,6 +189,8 @@ def fly_only(name, missions, bench):
         print(f"understory bench: --only {name}: no such mission in the table", file=sys.stderr)
         return 2
     flown = bench.fly(chosen[0])
+    if flown is None:
+        return 1
     print(spread.line_of(*flown))
     return 0 if is_good(flown[0]) else 1
 
