@@ -122,6 +122,16 @@ def markdown(rows):
     return "\n".join(lines) + "\n"
 
 
+def _time_ratio(rows, base):
+    """Of the mean completion times of those that are good."""
+    times, base_times = (
+        [float(row["completion_time_s"]) for row in group if is_good(row)] for group in (rows, base)
+    )
+    if not times or not base_times:
+        return "-"
+    return f"{statistics.fmean(times) / statistics.fmean(base_times):.2f}"
+
+
 def comparison(rows):
     """Mean completion times of the strategies as parts of the last one's; empty if there is one."""
     groups = grouped(rows)
@@ -132,16 +142,8 @@ def comparison(rows):
     lines = ["| scene | cap |" + "".join(f" {name} / {base} |" for name in others)]
     lines.append("|---|---|" + "---|" * len(others))
     for title, cap in dict.fromkeys((title, cap) for title, cap, _ in groups):
-        times = {
-            name: [float(row["completion_time_s"])
-                   for row in groups.get((title, cap, name), []) if is_good(row)]
-            for name in strategies
-        }
-        cells = [
-            f"{statistics.fmean(times[name]) / statistics.fmean(times[base]):.2f}"
-            if times[name] and times[base] else "-"
-            for name in others
-        ]
+        flown = {name: groups.get((title, cap, name), []) for name in strategies}
+        cells = [_time_ratio(flown[name], flown[base]) for name in others]
         lines.append(f"| {title} | {cap} | " + " | ".join(cells) + " |")
     return "\n".join(lines) + "\n"
 
@@ -153,17 +155,10 @@ def cost_of_variants(rows):
         return ""
     lines = [f"| variant | time / {variants[0]} | least coverage % | not completed |",
              "|---|---|---|---|"]
-    first = [row for row in rows if row["variant"] == variants[0] and is_good(row)]
-    for variant in variants:
-        members = [row for row in rows if row["variant"] == variant]
-        good = [row for row in members if is_good(row)]
-        ratio = "-"
-        if good and first:
-            times = [statistics.fmean(float(row["completion_time_s"]) for row in group)
-                     for group in (good, first)]
-            ratio = f"{times[0] / times[1]:.2f}"
+    by_variant = {name: [row for row in rows if row["variant"] == name] for name in variants}
+    for variant, members in by_variant.items():
+        ratio = _time_ratio(members, by_variant[variants[0]])
         least = min(100 * float(row["coverage"] or 0) for row in members)
-        lines.append(
-            f"| {variant} | {ratio} | {least:.2f} | {len(members) - len(good)} of {len(members)} |"
-        )
+        failed = sum(not is_good(row) for row in members)
+        lines.append(f"| {variant} | {ratio} | {least:.2f} | {failed} of {len(members)} |")
     return "\n".join(lines) + "\n"
