@@ -7,6 +7,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "understory/map/grid_geometry.hpp"
@@ -29,7 +30,7 @@ struct Cluster {
   Vector3d mean_m = Vector3d::Zero();
   Box3d bounds_m;
   ClusterLabel label = ClusterLabel::kFrontier;
-  bool is_worthless = false;          // borders an island too small to be worth a visit
+  std::optional<double> island_m3;    // size of the island of unknown space it borders, if small
   std::vector<Viewpoint> viewpoints;  // best coverage first; none: dormant
 
   [[nodiscard]] bool is_dormant() const { return viewpoints.empty(); }

@@ -65,7 +65,9 @@ struct FrontierConfig {
   double max_cluster_length_m = 2.0;
   int min_cluster_voxels = 40;
   double min_island_m3 = 0.0;
-  double min_island_share = 1.0;
+  double max_island_m3 = 0.0;
+  double max_left_share = 0.0;
+  double max_island_share = 1.0;
   double seen_share = 0.2;
   ViewpointConfig viewpoints;
   TrailConfig trails;
@@ -84,10 +86,19 @@ struct FrontierConfig {
             in_range(0.0, 1000.0),
             "nor are clusters that border an island of unknown space smaller than this (a trunk's "
             "inside counts)");
-    f.field("min_island_share",
-            min_island_share,
+    f.field("max_island_m3",
+            max_island_m3,
+            in_range(0.0, 1000.0),
+            "nor, the smallest first, islands up to this size, until so many are left:");
+    f.field("max_left_share",
+            max_left_share,
             in_range(0.0, 1.0),
-            "and than this share of the box, of which it would be a larger part if that is small");
+            "the frontier around islands that are left is at most this part of all known voxels, "
+            "unless those below min_island_m3 are more");
+    f.field("max_island_share",
+            max_island_share,
+            in_range(0.0, 1.0),
+            "no island of a larger part of the box than this is left");
     f.field("seen_share",
             seen_share,
             in_range(0.01, 1.0),

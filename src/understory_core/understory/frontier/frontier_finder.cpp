@@ -3,6 +3,7 @@
 #include "understory/frontier/frontier_finder.hpp"
 
 #include <algorithm>
+#include <bitset>
 #include <iterator>
 #include <set>
 
@@ -35,11 +36,10 @@ FrontierFinder::FrontierFinder(const FrontierConfig& config,
                                const GridGeometry& geometry)
     : config_(config),
       sampler_(config.viewpoints, camera),
-      min_island_m3_(
-          std::min(config.min_island_m3, config.min_island_share * geometry.box_m().volume())),
       geometry_(geometry),
       field_(geometry),
-      owners_(geometry.slot_count()) {}
+      owners_(geometry.slot_count()),
+      known_voxels_(geometry.slot_count()) {}
 
 std::uint32_t FrontierFinder::owner_of(const VoxelIndex& voxel) const {
   if (!geometry_.contains(voxel)) {
@@ -167,7 +167,7 @@ void FrontierFinder::refresh(const ClearanceMap& map,
     return std::binary_search(formed.begin(), formed.end(), id);
   };
   for (auto& [id, member] : members_) {
-    if (member->voxels.size() < static_cast<std::size_t>(config_.min_cluster_voxels)) {
+    if (!is_large(*member)) {
       continue;
     }
     const bool is_new = is_formed(id);
@@ -187,7 +187,7 @@ void FrontierFinder::refresh(const ClearanceMap& map,
       const Surroundings around = surroundings_of(map.snapshot(), cluster, config_.trails);
       const bool trail = around.is_free_all_around || neighbour_count(cluster) <= lone;
       cluster.label = trail ? ClusterLabel::kTrail : ClusterLabel::kFrontier;
-      cluster.is_worthless = around.island_m3 && *around.island_m3 < min_island_m3_;
+      cluster.island_m3 = around.island_m3;
     }
     if (resample) {
       cluster.viewpoints = sampler_.sample(map, routes, cluster);
@@ -198,6 +198,7 @@ void FrontierFinder::refresh(const ClearanceMap& map,
 
 void FrontierFinder::observe(const MapSnapshotPtr& snapshot) {
   const FrontierField::Change change = field_.update(snapshot);
+  count_known(*snapshot, change.tiles);
   pending_.added.insert(pending_.added.end(), change.added.begin(), change.added.end());
   pending_.removed.insert(pending_.removed.end(), change.removed.begin(), change.removed.end());
   std::vector<TileSlot> tiles;
@@ -216,12 +217,49 @@ const std::vector<ClusterPtr>& FrontierFinder::form(const ClearanceMap& map,
   pending_ = {};
   clusters_.clear();
   worthless_.clear();
+  const double least_m3 = least_island_m3();
   for (const auto& [id, member] : members_) {
-    if (member->voxels.size() >= static_cast<std::size_t>(config_.min_cluster_voxels)) {
-      (member->is_worthless ? worthless_ : clusters_).push_back(member);
+    if (is_large(*member)) {
+      const bool is_worthless = member->island_m3 && *member->island_m3 < least_m3;
+      (is_worthless ? worthless_ : clusters_).push_back(member);
     }
   }
   return clusters_;
+}
+
+void FrontierFinder::count_known(const MapSnapshot& snapshot,
+                                 const std::vector<TileSlot>& changed) {
+  for (const TileSlot slot : changed) {
+    std::size_t known = 0;
+    if (const Tile* tile = snapshot.tiles[slot].get()) {
+      for (const std::uint16_t row : tile->known_rows) {
+        known += std::bitset<16>(row).count();
+      }
+    }
+    all_known_voxels_ = all_known_voxels_ - known_voxels_[slot] + known;
+    known_voxels_[slot] = static_cast<std::uint16_t>(known);
+  }
+}
+
+// What islands have to have to be worth a visit: the smaller they may be, the more are left.
+double FrontierFinder::least_island_m3() const {
+  std::vector<std::pair<double, std::size_t>> islands;  // size, and the frontier around it
+  for (const auto& [id, member] : members_) {
+    if (is_large(*member) && member->island_m3) {
+      islands.emplace_back(*member->island_m3, member->voxels.size());
+    }
+  }
+  std::sort(islands.begin(), islands.end());
+  double room = config_.max_left_share * static_cast<double>(all_known_voxels_);
+  double least_m3 = std::max(config_.min_island_m3, config_.max_island_m3);
+  for (const auto& [island_m3, frontier_voxels] : islands) {
+    room -= static_cast<double>(frontier_voxels);
+    if (room < 0.0) {
+      least_m3 = std::clamp(island_m3, config_.min_island_m3, least_m3);
+      break;
+    }
+  }
+  return std::min(least_m3, config_.max_island_share * geometry_.box_m().volume());
 }
 
 double FrontierFinder::remaining_share(const std::vector<VoxelIndex>& voxels) const {

@@ -34,7 +34,8 @@ class FrontierFinder {
   const std::vector<ClusterPtr>& form(const ClearanceMap& map, const RouteSearch& routes);
 
   [[nodiscard]] const std::vector<ClusterPtr>& clusters() const { return clusters_; }
-  // Those that border an island too small to be worth a visit; clusters() has none of them.
+  // Those that border an island too small to be worth a visit, which depends on how many are left
+  // already; clusters() has none of them.
   [[nodiscard]] const std::vector<ClusterPtr>& worthless() const { return worthless_; }
 
   // Share of these voxels that is still frontier.
@@ -57,16 +58,22 @@ class FrontierFinder {
                const std::vector<std::uint32_t>& formed);
   [[nodiscard]] bool map_changed_within(double distance_m, const Cluster& cluster) const;
   [[nodiscard]] std::size_t neighbour_count(const Cluster& cluster) const;
+  void count_known(const MapSnapshot& snapshot, const std::vector<TileSlot>& changed);
+  [[nodiscard]] bool is_large(const Cluster& cluster) const {
+    return cluster.voxels.size() >= static_cast<std::size_t>(config_.min_cluster_voxels);
+  }
+  [[nodiscard]] double least_island_m3() const;
 
   FrontierConfig config_;
   ViewpointSampler sampler_;
-  double min_island_m3_;
   GridGeometry geometry_;
   FrontierField field_;
   FrontierField::Change pending_;                // since the last form()
   std::vector<std::unique_ptr<Owners>> owners_;  // cluster id per voxel
   std::map<std::uint32_t, ClusterPtr> members_;  // all clusters, too small ones as well
   std::uint32_t next_id_ = 2;                    // 0: no owner, 1: pooled
+  std::vector<std::uint16_t> known_voxels_;      // of each tile
+  std::size_t all_known_voxels_ = 0;
   std::vector<ClusterPtr> clusters_;
   std::vector<ClusterPtr> worthless_;
 };
