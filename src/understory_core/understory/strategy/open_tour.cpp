@@ -16,7 +16,10 @@ constexpr std::size_t kKickedPlaces = 30;
 // beginning, after the last one nothing.
 class Improver {
  public:
-  Improver(const TourCosts& costs, Tour tour) : costs_(costs), tour_(std::move(tour)) {}
+  Improver(const TourCosts& costs, Tour tour) : costs_(costs), tour_(std::move(tour)) {
+    legs_.resize(tour_.size() + 1);
+    measure_legs(0, tour_.size());
+  }
 
   [[nodiscard]] const Tour& tour() const { return tour_; }
 
@@ -31,6 +34,8 @@ class Improver {
       }
     }
     tour_.insert(tour_.begin() + static_cast<std::ptrdiff_t>(best), place);
+    legs_.insert(legs_.begin() + static_cast<std::ptrdiff_t>(best), 0.0);
+    measure_legs(best, best + 1);
   }
 
   // Until neither reversing a piece nor moving a short one helps, among the first `end` positions.
@@ -58,18 +63,24 @@ class Improver {
       return tour_.begin() + static_cast<std::ptrdiff_t>(position);
     };
     std::rotate(at(cuts[0]), at(cuts[1]), at(cuts[2]));
+    measure_legs(cuts[0], cuts[2]);
   }
 
  private:
-  // The edge that leads to position `to` if `place` is there; none beyond the end.
+  // The edge that leads to position `to` if `place` is there; none beyond the end. Asked for one
+  // place and many positions, this stays in one row of the costs.
   [[nodiscard]] double edge(std::size_t to, std::size_t place) const {
-    return to == 0 ? costs_.first(place) : costs_.between(tour_[to - 1], place);
+    return to == 0 ? costs_.first(place) : costs_.between(place, tour_[to - 1]);
   }
   [[nodiscard]] double edge_from(std::size_t place, std::size_t to) const {
     return to < tour_.size() ? costs_.between(place, tour_[to]) : 0.0;
   }
-  [[nodiscard]] double edge_at(std::size_t to) const {
-    return to < tour_.size() ? edge(to, tour_[to]) : 0.0;
+  [[nodiscard]] double edge_at(std::size_t to) const { return legs_[to]; }
+  // Those that lead to these positions, the last one included.
+  void measure_legs(std::size_t first, std::size_t last) {
+    for (std::size_t to = first; to <= last && to < tour_.size(); ++to) {
+      legs_[to] = edge(to, tour_[to]);
+    }
   }
   [[nodiscard]] double detour(std::size_t at, std::size_t place) const {
     return edge(at, place) + edge_from(place, at) - edge_at(at);
@@ -83,6 +94,7 @@ class Improver {
       if (after < before - kLeastGain) {
         std::reverse(tour_.begin() + static_cast<std::ptrdiff_t>(i),
                      tour_.begin() + static_cast<std::ptrdiff_t>(j + 1));
+        measure_legs(i, j + 1);
         is_better = true;
       }
     }
@@ -126,11 +138,13 @@ class Improver {
     } else {
       std::rotate(position(best_at), position(i), position(next));
     }
+    measure_legs(std::min(i, best_at), std::max(next, best_at));
     return true;
   }
 
   const TourCosts& costs_;
   Tour tour_;
+  std::vector<double> legs_;  // edges that lead to each position; a last one, 0, beyond the end
 };
 
 }  // namespace
