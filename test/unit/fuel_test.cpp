@@ -98,8 +98,8 @@ TEST_F(FuelTest, TurnsTheCameraNoFurtherThanItMust) {
 // Two clusters are near each other as the crow flies, with a wall between.
 TEST_F(FuelTest, MeasuresBetweenClustersAroundWalls) {
   builder.set_box(kWall, VoxelState::kOccupied);
-  add({{0, -9}});
-  add({{2, -9}});
+  add({{0, 5}});
+  add({{2, 5}});
   map.update(builder.build());
   ClusterLengths lengths(builder.geometry(), 0.3);
   const Cluster& a = *input.candidates[0].cluster;
@@ -107,9 +107,9 @@ TEST_F(FuelTest, MeasuresBetweenClustersAroundWalls) {
 
   lengths.update(map, {&a, &b});
 
-  EXPECT_GT(lengths.from(a).at(b.id), 35.0);
-  EXPECT_LT(lengths.from(a).at(b.id), 45.0);
-  EXPECT_DOUBLE_EQ(lengths.from(a).at(b.id), lengths.from(b).at(a.id));
+  EXPECT_GT(lengths.between(0, 1), 10.0);
+  EXPECT_LT(lengths.between(0, 1), 14.5);
+  EXPECT_DOUBLE_EQ(lengths.between(0, 1), lengths.between(1, 0));
 }
 
 TEST_F(FuelTest, AssumesADetourWhereItKnowsNoWay) {
@@ -123,7 +123,43 @@ TEST_F(FuelTest, AssumesADetourWhereItKnowsNoWay) {
 
   lengths.update(map, {&a, &b});
 
-  EXPECT_DOUBLE_EQ(lengths.from(a).at(b.id), 1.5 * 4.0 + 5.0);
+  EXPECT_DOUBLE_EQ(lengths.between(0, 1), 15.0);
+}
+
+TEST_F(FuelTest, RemembersLengthsAsClustersComeAndGo) {
+  for (int i = 0; i < 6; ++i) {
+    add({{-10.0 + 3.0 * i, 0.5 * i * i}});
+  }
+  map.update(builder.build());
+  std::vector<const Cluster*> all;
+  for (const Candidate& candidate : input.candidates) {
+    all.push_back(candidate.cluster.get());
+  }
+  const auto of = [&](const std::vector<std::size_t>& places) {
+    std::vector<const Cluster*> chosen;
+    for (const std::size_t place : places) {
+      chosen.push_back(all[place]);
+    }
+    return chosen;
+  };
+  ClusterLengths lengths(builder.geometry(), 0.3);
+  for (const std::vector<std::size_t>& places : {std::vector<std::size_t>{0, 1, 2},
+                                                 {2, 3},
+                                                 {0, 2, 3, 4, 5},
+                                                 {1, 4, 5},
+                                                 {5, 4, 3, 2, 1, 0}}) {
+    ClusterLengths anew(builder.geometry(), 0.3);
+
+    lengths.update(map, of(places));
+    anew.update(map, of(places));
+
+    for (std::size_t a = 0; a < places.size(); ++a) {
+      for (std::size_t b = 0; b < places.size(); ++b) {
+        EXPECT_NEAR(lengths.between(a, b), anew.between(a, b), 0.5)
+            << places[a] << " " << places[b];
+      }
+    }
+  }
 }
 
 TEST_F(FuelTest, TakesOfTheNextClusterTheViewThatTheRestOfTheTourLikesBest) {

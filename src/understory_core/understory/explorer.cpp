@@ -186,7 +186,7 @@ void Explorer::estimate(const ClearanceMap& map, StrategyInput& input) {
     }
   }
   const std::vector<std::optional<double>> lengths_m =
-      far_routes_.lengths_m(map, input.vehicle.position_m, entries);
+      far_routes_.lengths_m(map, input.vehicle.position_m, entries, kUnreachable);
   for (std::size_t i = 0; i < far.size(); ++i) {
     if (lengths_m[i]) {
       // Nearer than this the exact search would have found it.

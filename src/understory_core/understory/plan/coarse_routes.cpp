@@ -43,8 +43,9 @@ RouteLattice::Node CoarseRoutes::entry_of(const ClearanceMap& map, const Vector3
 
 std::vector<std::optional<double>> CoarseRoutes::lengths_m(const ClearanceMap& map,
                                                            const Vector3d& from_m,
-                                                           const Entries& entries) {
-  routes_.run(map, from_m, entries, std::numeric_limits<double>::infinity());
+                                                           const Entries& entries,
+                                                           double max_length_m) {
+  routes_.run(map, from_m, entries, max_length_m);
   std::vector<std::optional<double>> lengths;
   lengths.reserve(entries.size());
   for (const RouteLattice::Node& entry : entries) {

@@ -21,10 +21,12 @@ class CoarseRoutes {
   CoarseRoutes(const GridGeometry& geometry, double clearance_m);
 
   [[nodiscard]] RouteLattice::Node entry_of(const ClearanceMap& map, const Vector3d& at_m) const;
-  // Nothing: no way was found. At least the straight line is up to the caller.
+  // Nothing: no way was found, or none up to `max_length_m`. At least the straight line is up to
+  // the caller.
   [[nodiscard]] std::vector<std::optional<double>> lengths_m(const ClearanceMap& map,
                                                              const Vector3d& from_m,
-                                                             const Entries& entries);
+                                                             const Entries& entries,
+                                                             double max_length_m);
 
  private:
   RouteSearch routes_;

@@ -7,9 +7,9 @@
 namespace understory {
 namespace {
 
-// Of a way that the lattice does not know, against the straight line.
-constexpr double kDetourFactor = 1.5;
-constexpr double kDetourM = 5.0;
+// Of what comes next the order matters; the work grows with the square of this.
+constexpr double kLongestSearchedM = 15.0;
+constexpr double kDetourFactor = 1.2;  // of ways that were not found, on the straight line
 
 const Vector3d& view_of(const Cluster& cluster) {
   return cluster.viewpoints.front().position_m;
@@ -17,18 +17,44 @@ const Vector3d& view_of(const Cluster& cluster) {
 
 }  // namespace
 
-void ClusterLengths::update(const ClearanceMap& map, const std::vector<const Cluster*>& clusters) {
-  std::unordered_map<std::uint32_t, Row> kept;
-  std::vector<const Cluster*> fresh;
-  for (const Cluster* cluster : clusters) {
-    const auto row = rows_.find(cluster->id);
-    if (row == rows_.end()) {
-      fresh.push_back(cluster);
+// Of all clusters; returns the places of those that are new.
+std::vector<std::size_t> ClusterLengths::take_slots(const std::vector<const Cluster*>& clusters) {
+  std::unordered_map<std::uint32_t, Slot> gone = std::move(slot_of_);
+  slot_of_ = {};
+  std::vector<std::size_t> fresh;
+  for (std::size_t place = 0; place < clusters.size(); ++place) {
+    const auto known = gone.find(clusters[place]->id);
+    if (known == gone.end()) {
+      fresh.push_back(place);
     } else {
-      kept.emplace(cluster->id, std::move(row->second));
+      slot_of_.insert(gone.extract(known));
     }
   }
-  rows_ = std::move(kept);
+  for (const auto& [id, slot] : gone) {
+    unused_.push_back(slot);
+  }
+  // Whatever order they were found in.
+  std::sort(unused_.begin(), unused_.end());
+  for (const std::size_t place : fresh) {
+    if (unused_.empty()) {
+      unused_.push_back(rows_m_.size());
+      rows_m_.emplace_back();
+      for (std::vector<double>& row_m : rows_m_) {
+        row_m.resize(rows_m_.size());
+      }
+    }
+    slot_of_.emplace(clusters[place]->id, unused_.back());
+    unused_.pop_back();
+  }
+  slots_.clear();
+  for (const Cluster* cluster : clusters) {
+    slots_.push_back(slot_of_.at(cluster->id));
+  }
+  return fresh;
+}
+
+void ClusterLengths::update(const ClearanceMap& map, const std::vector<const Cluster*>& clusters) {
+  const std::vector<std::size_t> fresh = take_slots(clusters);
   if (fresh.empty()) {
     return;
   }
@@ -37,23 +63,18 @@ void ClusterLengths::update(const ClearanceMap& map, const std::vector<const Clu
   for (const Cluster* cluster : clusters) {
     entries.push_back(routes_.entry_of(map, view_of(*cluster)));
   }
-  for (const Cluster* from : fresh) {
+  for (const std::size_t from : fresh) {
+    const Vector3d& from_m = view_of(*clusters[from]);
     const std::vector<std::optional<double>> found_m =
-        routes_.lengths_m(map, view_of(*from), entries);
-    Row& row = rows_[from->id];
-    for (std::size_t i = 0; i < clusters.size(); ++i) {
-      const Cluster& to = *clusters[i];
-      const double straight_m = (view_of(to) - view_of(*from)).norm();
-      const double length_m =
-          found_m[i] ? std::max(*found_m[i], straight_m) : kDetourFactor * straight_m + kDetourM;
-      row[to.id] = length_m;
-      rows_[to.id][from->id] = length_m;
+        routes_.lengths_m(map, from_m, entries, kLongestSearchedM);
+    for (std::size_t to = 0; to < clusters.size(); ++to) {
+      const double straight_m = (view_of(*clusters[to]) - from_m).norm();
+      const double length_m = found_m[to] ? std::max(*found_m[to], straight_m)
+                                          : std::max(kLongestSearchedM, kDetourFactor * straight_m);
+      rows_m_[slots_[from]][slots_[to]] = length_m;
+      rows_m_[slots_[to]][slots_[from]] = length_m;
     }
   }
-}
-
-const ClusterLengths::Row& ClusterLengths::from(const Cluster& cluster) const {
-  return rows_.at(cluster.id);
 }
 
 }  // namespace understory

@@ -64,10 +64,9 @@ Tour Fuel::tour_over(const StrategyInput& input, const std::vector<Group>& group
   for (std::size_t a = 0; a < groups.size(); ++a) {
     const Candidate& from = *groups[a].begin;
     costs.set_first(a, first_cost(input.vehicle, from));
-    const ClusterLengths::Row& lengths_m = lengths_.from(*clusters[a]);
     for (std::size_t b = a + 1; b < groups.size(); ++b) {
-      const double length_m = lengths_m.at(clusters[b]->id);
-      costs.set_between(a, b, cost(from.viewpoint, groups[b].begin->viewpoint, length_m));
+      const Viewpoint& to = groups[b].begin->viewpoint;
+      costs.set_between(a, b, cost(from.viewpoint, to, lengths_.between(a, b)));
     }
   }
   Tour hint;

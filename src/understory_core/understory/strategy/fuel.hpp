@@ -19,7 +19,7 @@ struct FuelConfig {
   double refined_radius_m = 5.0;
   int refined_views = 15;
   double least_view_share = 0.8;
-  int tour_kicks = 40;
+  int tour_kicks = 12;
 
   void visit(FieldVisitor& f) {
     f.field("direction_weight",
