@@ -83,7 +83,7 @@ class TableFiles(TemporaryFolder):
         self.assertEqual(missions[-1].title, "three")
         self.assertEqual(missions[0].title, "a")
         names = [f"{mission.scenario}{mission.strategy[0]}" for mission in quick(missions)]
-        self.assertEqual(names, ["ax", "ay", "bx", "by", "ce"])
+        self.assertEqual(names, ["ax", "ay", "ce"])
 
     def test_variants_have_settings_and_a_line_each(self):
         path = self.write(

@@ -38,7 +38,8 @@ def parse_arguments():
     parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1, help="missions at once")
     parser.add_argument("--out", type=pathlib.Path, help="folder (default: results/bench/NAME)")
     parser.add_argument(
-        "--quick", action="store_true", help="only the first mission of each scenario and strategy"
+        "--quick", action="store_true",
+        help="only the first mission of every other scenario, for each strategy",
     )
     parser.add_argument("--fresh", action="store_true", help="fly all again")
     parser.add_argument(

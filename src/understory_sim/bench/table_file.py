@@ -153,8 +153,10 @@ def read_table(path, root):
 
 
 def quick(missions):
-    """A taste of a table: of each scenario one forest and seed, as fast as allowed."""
+    """A taste of a table: of every other scenario one forest and seed, as fast as allowed."""
+    scenarios = list(dict.fromkeys(mission.scenario for mission in missions))[::2]
     first = {}
     for mission in missions:
-        first.setdefault((mission.scenario, mission.strategy, mission.variant), mission)
+        if mission.scenario in scenarios:
+            first.setdefault((mission.scenario, mission.strategy, mission.variant), mission)
     return list(first.values())
