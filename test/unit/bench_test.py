@@ -216,15 +216,19 @@ class Rows(TemporaryFolder):
 
     def test_cost_of_variants_is_against_the_first(self):
         rows = [
-            dict(self.row(), variant="as it is"),
-            dict(self.row(completion_time_s=125.0, coverage=0.9), variant="slow"),
-            dict(self.row(completed=False, completion_time_s=None), variant="blind"),
+            dict(self.row(**changes), variant=name, title=name)
+            for name, changes in (
+                ("as it is", {}),
+                ("slow", {"completion_time_s": 125.0, "coverage": 0.9}),
+                ("blind", {"completed": False, "completion_time_s": None}),
+            )
         ]
         lines = cost_of_variants(rows).splitlines()
         self.assertEqual(lines[2], "| as it is | 1.00 | 99.50 | 0 of 1 |")
         self.assertEqual(lines[3], "| slow | 1.25 | 90.00 | 0 of 1 |")
         self.assertEqual(lines[4], "| blind | - | 99.50 | 1 of 1 |")
         self.assertEqual(cost_of_variants(rows[:1]), "")
+        self.assertEqual(cost_of_variants([dict(row, title="group") for row in rows]), "")
 
     def test_of_another_version_are_refused(self):
         path = self.write("rows.csv", "scene,seed,speed_cap\na,1,paper\n")

@@ -149,8 +149,8 @@ def comparison(rows):
 
 
 def cost_of_variants(rows):
-    """Mean completion times as parts of the first variant's; empty if there are none."""
-    variants = list(dict.fromkeys(row["variant"] for row in rows))
+    """Mean completion times as parts of the first variant's; empty if none has its own line."""
+    variants = list(dict.fromkeys(r["variant"] for r in rows if r["title"] == r["variant"]))
     if len(variants) < 2:
         return ""
     lines = [f"| variant | time / {variants[0]} | least coverage % | not completed |",

@@ -8,7 +8,8 @@
     speed_caps: [paper, strict]
     title: TEXT               of the group's line in the table (default: one line per scene)
     strategies: [NAME, ...]   of config/strategies (default: explorer_collector)
-    variants: {NAME: {...}}   configuration over that of all files; one line in the table per variant
+    variants: {NAME: {...}}   configuration over that of all files; one line in the table per variant,
+                              unless the group has a title
 
 or `groups:` a list of such groups.
 """
