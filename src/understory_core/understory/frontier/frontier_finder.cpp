@@ -241,7 +241,7 @@ void FrontierFinder::count_known(const MapSnapshot& snapshot,
   }
 }
 
-// What islands have to have to be worth a visit: the smaller they may be, the more are left.
+// The size from which on an island is worth a visit: the fewer are left so far, the larger.
 double FrontierFinder::least_island_m3() const {
   std::vector<std::pair<double, std::size_t>> islands;  // size, and the frontier around it
   for (const auto& [id, member] : members_) {
