@@ -163,6 +163,7 @@ void Explorer::measure(const Pilot& pilot, Reach reach, StrategyInput& input) {
   }
   const double max_length_m = reach < Reach::kAll ? config_.replan.near_route_m : kUnreachable;
   RouteSearch& routes = reach == Reach::kThroughTightGaps ? tight_routes_ : routes_;
+  // The lengths to what is near are still those of the question before.
   const bool was_asked_near = reach == Reach::kFar && !strategy_->needs_all();
   if (!was_asked_near) {
     routes.run(pilot.clearance(), input.vehicle.position_m, nodes, max_length_m);
