@@ -18,10 +18,10 @@ from pathlib import Path
 from typing import Any, Callable, Dict, Iterator, List, NamedTuple, Optional, Sequence, Tuple
 
 from can_tools import FRAME, ROOT, STAMPS_NS, must_run, wait_until
-from machine import Machine, Never, tried_again
 
-sys.path.append(str(ROOT / "firmware_bridge" / "can"))
+sys.path += [str(ROOT / "firmware_bridge" / "can"), str(ROOT / "test" / "support")]
 import dbc  # noqa: E402  pylint: disable=wrong-import-position
+from machine import PatientTest  # noqa: E402  pylint: disable=wrong-import-position
 
 HOST_BUS = "vcan0"
 VEHICLE_BUS = "vcan1"  # behind the faulty wire
@@ -295,17 +295,10 @@ class Program:
         return {name: int(value) for name, value in re.findall(r"([a-z]+) (\d+)(?= |$)", line)}
 
 
-class FlightTest(unittest.TestCase):
+class FlightTest(PatientTest):
     """Whatever a test starts ends with it."""
 
     host_bus = vehicle_bus = HOST_BUS
-    machine: Machine
-
-    def __init_subclass__(cls, **words: Any) -> None:
-        super().__init_subclass__(**words)
-        for name, method in list(vars(cls).items()):
-            if name.startswith("test"):
-                setattr(cls, name, tried_again(method))
 
     def setUp(self) -> None:
         self.programs: List[Program] = []
@@ -319,7 +312,7 @@ class FlightTest(unittest.TestCase):
         return outcome
 
     def show_programs(self) -> None:
-        """What they said last tells most about a failure."""
+        """What they said last tells most."""
         for started in self.programs:
             print("   ", " ".join(map(str, started.process.args)))
             print(*(f"      {line}" for line in started.lines[-LINES_SHOWN:]), sep="\n")
@@ -358,11 +351,6 @@ class FlightTest(unittest.TestCase):
             "ODO_POS_Z", lambda said: said["OdoZ"] > LAUNCHER_HEIGHT_M + 0.4, since_s=began_s
         )
         return vehicle, host
-
-    def assert_never(self, is_so: Any, what: str) -> None:
-        """However slow the machine is."""
-        if is_so:
-            raise Never(f"{what}: {is_so}")
 
     def assert_never_armed(self, since_s: float = 0.0) -> None:
         states = [state for state, _ in self.bus.states(since_s)]

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any, Dict
 
 ROOT = Path(__file__).resolve().parents[2]
-sys.path.insert(0, str(ROOT / "hil" / "test"))
+sys.path[:0] = [str(ROOT / "hil" / "test"), str(ROOT / "test" / "support")]
 
 from bench import HOST_BUS, MEMORY, Program, program, summary_of  # noqa: E402
 from machine import Machine  # noqa: E402

@@ -15,7 +15,9 @@ import subprocess
 import sys
 import time
 import unittest
-from typing import Any, Callable, List, Tuple
+from typing import Any, Callable, List, Tuple, Type, TypeVar
+
+T = TypeVar("T")
 
 HIGHEST_PRIORITY = 99  # over all that is tested: only the machine itself can make it late
 NAP_S = 0.01
@@ -29,6 +31,7 @@ ATTEMPTS = 3
 ATTEMPT_PATIENCE_S = 120
 CALM_S = 3
 CALM_TRIES = 10  # before another attempt
+LEFT_S = 300.0  # for other attempts, of one program
 
 
 def watch() -> None:
@@ -124,39 +127,110 @@ def wait_for_calm() -> None:
         print(f"    waiting for a calm machine: {trouble}", flush=True)
 
 
+class Patience:
+    """How much time this program has left for what did not go well at first: programs have time
+    limits, and a machine may be bad all day."""
+
+    def __init__(self, left_s: float = LEFT_S) -> None:
+        self._left_s = left_s
+
+    def is_over(self) -> bool:
+        return self._left_s <= 0.0
+
+    def spend(self, seconds: float) -> None:
+        self._left_s -= seconds
+
+
+PATIENCE = Patience()
+
+
+def attempted(
+    act: Callable[[Machine], T],
+    failures: Tuple[Type[BaseException], ...] = (AssertionError,),
+    machine_of_now: Callable[[], Machine] = Machine,
+    before_another: Callable[[], None] = wait_for_calm,
+    patience: Patience = PATIENCE,
+) -> T:
+    """What `act` returns. A failure counts if the machine was fast enough meanwhile; else `act` is
+    called again. The last one counts too, but where nothing could have been tested: that is
+    skipped."""
+    attempt = 0
+    while True:
+        attempt += 1
+        began_s = time.monotonic()
+        if attempt > 1:
+            before_another()
+        machine = machine_of_now()
+        try:
+            return act(machine)
+        except (Never, unittest.SkipTest):
+            raise
+        except failures as error:
+            trouble = machine.trouble()
+            reason = str(error).split("\n", maxsplit=1)[0]
+            print(f"    attempt {attempt}: {trouble or 'a calm machine'}; {reason}", flush=True)
+            is_last = attempt == ATTEMPTS or patience.is_over()
+            if is_last and machine.is_hopeless():
+                raise unittest.SkipTest(f"{trouble}; {reason}") from error
+            if not trouble or is_last:
+                raise
+        finally:
+            machine.close()
+            if attempt > 1:
+                patience.spend(time.monotonic() - began_s)
+
+
 def tried_again(test: Callable[[Any], None]) -> Callable[[Any], None]:
-    """A failure counts if the machine was fast enough meanwhile; else the test is done again. The
-    last one counts too, but where nothing could have been tested: that is skipped."""
+    """A test of a PatientTest that is attempted so."""
 
     @functools.wraps(test)
-    def tried(self: Any) -> None:
-        for attempt in range(1, ATTEMPTS + 1):
-            runners = signal.alarm(0)
-            if attempt > 1:
-                wait_for_calm()
-            machine = self.machine = Machine()
-            signal.alarm(runners and ATTEMPT_PATIENCE_S)  # for each anew
-            try:
-                if attempt > 1:
-                    self.setUp()
-                test(self)
-                return
-            except Never:
-                raise
-            except (AssertionError, LookupError, subprocess.TimeoutExpired) as error:
-                trouble = machine.trouble()
-                reason = str(error).split("\n", maxsplit=1)[0]
-                print(f"    attempt {attempt}: {trouble or 'a calm machine'}; {reason}", flush=True)
-                if attempt == ATTEMPTS and machine.is_hopeless():
-                    raise unittest.SkipTest(f"{trouble}; {reason}") from error
-                if not trouble or attempt == ATTEMPTS:
-                    raise
-                self.show_programs()
-            finally:
-                machine.close()
+    def tried(self: "PatientTest") -> None:
+        # The runner's alarm, if it set one, is for each attempt anew and not for the pauses.
+        has_alarm = signal.alarm(0) > 0
+
+        def prepare_another() -> None:
+            signal.alarm(0)
+            self.show_programs()
             self.doCleanups()
+            wait_for_calm()
+
+        def attempt(machine: Machine) -> None:
+            is_another = hasattr(self, "machine")
+            self.machine = machine
+            signal.alarm(has_alarm and ATTEMPT_PATIENCE_S)
+            if is_another:
+                self.setUp()
+            test(self)
+
+        attempted(attempt, self.failures, Machine, prepare_another)
 
     return tried
+
+
+class PatientTest(unittest.TestCase):
+    """All its tests are attempted so: with setUp and the cleanups, but not tearDown, in between."""
+
+    failures: Tuple[Type[BaseException], ...] = (
+        AssertionError,
+        LookupError,
+        subprocess.TimeoutExpired,
+    )
+    machine: Machine  # since this attempt began
+
+    def __init_subclass__(cls, **words: Any) -> None:
+        super().__init_subclass__(**words)
+        for name, method in list(vars(cls).items()):
+            if name.startswith("test"):
+                setattr(cls, name, tried_again(method))
+
+    @staticmethod
+    def assert_never(is_so: Any, what: str) -> None:
+        """However slow the machine is."""
+        if is_so:
+            raise Never(f"{what}: {is_so}")
+
+    def show_programs(self) -> None:
+        """Called after an attempt that failed and before the next: what tells most about it."""
 
 
 if __name__ == "__main__":

@@ -1,0 +1,206 @@
+#!/usr/bin/python3
+# Copyright 2026 the Understory authors
+# SPDX-License-Identifier: BSD-3-Clause
+"""What a machine that stood still excuses and what it does not."""
+
+import contextlib
+import io
+import pathlib
+import sys
+import unittest
+import unittest.mock
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(ROOT / "test" / "support"))
+
+import machine  # noqa: E402
+
+
+class FakeMachine:
+    def __init__(self, trouble="", is_hopeless=False):
+        self._trouble = trouble
+        self._is_hopeless = is_hopeless
+        self.is_closed = False
+
+    def trouble(self):
+        return self._trouble
+
+    def is_hopeless(self):
+        return self._is_hopeless
+
+    def close(self):
+        self.is_closed = True
+
+
+def calm():
+    return FakeMachine()
+
+
+def stalled():
+    return FakeMachine("it stood still")
+
+
+def hopeless():
+    return FakeMachine("it stood still", True)
+
+
+class Attempts:
+    """What is done fails at all attempts but those in `good`; the machines are of this order."""
+
+    def __init__(self, *machines, good=(), error=AssertionError("late"), patience=None):
+        self._machines = iter(machines)
+        self._good = good
+        self._error = error
+        self._patience = patience or machine.Patience()
+        self.made = []
+        self.count = 0
+        self.pauses = 0
+
+    def _next_machine(self):
+        self.made.append(next(self._machines)())
+        return self.made[-1]
+
+    def _act(self, now):
+        assert now is self.made[-1]
+        self.count += 1
+        if self.count in self._good:
+            return self.count
+        raise self._error
+
+    def _pause(self):
+        self.pauses += 1
+
+    def run(self):
+        with contextlib.redirect_stdout(io.StringIO()):
+            return machine.attempted(
+                self._act,
+                machine_of_now=self._next_machine,
+                before_another=self._pause,
+                patience=self._patience,
+            )
+
+
+class WhatCounts(unittest.TestCase):
+    def test_success_counts_on_any_machine(self):
+        attempts = Attempts(hopeless, good=(1,))
+
+        self.assertEqual(attempts.run(), 1)
+        self.assertEqual((attempts.count, attempts.pauses), (1, 0))
+
+    def test_a_failure_on_a_calm_machine_counts_at_once(self):
+        attempts = Attempts(calm, good=(2,))
+
+        with self.assertRaisesRegex(AssertionError, "late"):
+            attempts.run()
+        self.assertEqual(attempts.count, 1)
+
+    def test_a_failure_on_a_stalled_machine_is_tried_again_after_a_pause(self):
+        attempts = Attempts(stalled, calm, good=(2,))
+
+        self.assertEqual(attempts.run(), 2)
+        self.assertEqual(attempts.pauses, 1)
+
+    def test_each_attempt_is_judged_by_its_own_machine(self):
+        attempts = Attempts(hopeless, calm, good=(3,))
+
+        with self.assertRaises(AssertionError):
+            attempts.run()
+        self.assertEqual(attempts.count, 2)
+
+    def test_the_last_failure_counts_if_the_machine_was_merely_slow(self):
+        attempts = Attempts(hopeless, hopeless, stalled)
+
+        with self.assertRaisesRegex(AssertionError, "late"):
+            attempts.run()
+        self.assertEqual(attempts.count, machine.ATTEMPTS)
+
+    def test_where_the_last_machine_was_hopeless_it_is_skipped_with_both_reasons(self):
+        attempts = Attempts(stalled, stalled, hopeless)
+
+        with self.assertRaisesRegex(unittest.SkipTest, "it stood still; late"):
+            attempts.run()
+
+    def test_what_must_never_happen_counts_on_a_hopeless_machine(self):
+        attempts = Attempts(hopeless, good=(2,), error=machine.Never("a collision"))
+
+        with self.assertRaisesRegex(machine.Never, "a collision"):
+            attempts.run()
+        self.assertEqual(attempts.count, 1)
+
+    def test_errors_of_another_kind_count_at_once(self):
+        attempts = Attempts(hopeless, good=(2,), error=KeyError("wrong"))
+
+        with self.assertRaises(KeyError):
+            attempts.run()
+
+    def test_every_machine_is_let_go(self):
+        attempts = Attempts(stalled, stalled, hopeless)
+
+        with self.assertRaises(unittest.SkipTest):
+            attempts.run()
+        self.assertEqual([one.is_closed for one in attempts.made], [True] * 3)
+
+    def test_without_time_left_the_first_failure_is_the_last(self):
+        for kind, verdict in ((stalled, AssertionError), (hopeless, unittest.SkipTest)):
+            attempts = Attempts(kind, good=(2,), patience=machine.Patience(0.0))
+
+            with self.assertRaises(verdict):
+                attempts.run()
+
+
+class Tests(unittest.TestCase):
+    """A test of a PatientTest."""
+
+    def outcome_of(self, body, *machines):
+        """What unittest says, and in which order things were done."""
+        done = []
+
+        class Inner(machine.PatientTest):
+            def setUp(self):
+                done.append("set up")
+                self.addCleanup(done.append, "cleaned up")
+
+            def show_programs(self):
+                done.append("shown")
+
+            def test_it(self):
+                done.append("tested")
+                body(self, done.count("tested"))
+
+        made = iter(machines)
+        result = unittest.TestResult()
+        with unittest.mock.patch.object(machine, "Machine", lambda: next(made)()):
+            with unittest.mock.patch.object(machine, "wait_for_calm", lambda: done.append("calm")):
+                with contextlib.redirect_stdout(io.StringIO()):
+                    Inner("test_it").run(result)
+        return result, done
+
+    def test_another_attempt_begins_after_cleanups_a_pause_and_set_up(self):
+        result, done = self.outcome_of(
+            lambda test, attempt: test.assertEqual(attempt, 2), stalled, calm
+        )
+
+        self.assertTrue(result.wasSuccessful())
+        first = ["set up", "tested", "shown", "cleaned up", "calm"]
+        self.assertEqual(done, first + ["set up", "tested", "cleaned up"])
+
+    def test_a_hopeless_machine_is_a_skip_that_is_counted(self):
+        result, done = self.outcome_of(
+            lambda test, _: test.fail("late"), hopeless, hopeless, hopeless
+        )
+
+        self.assertEqual(len(result.skipped), 1)
+        self.assertEqual(result.skipped[0][1], "it stood still; late")
+        self.assertEqual(done.count("cleaned up"), 3)
+
+    def test_what_must_never_happen_is_a_failure(self):
+        result, _ = self.outcome_of(
+            lambda test, _: test.assert_never([1, 2], "collisions"), hopeless
+        )
+
+        self.assertEqual(len(result.failures), 1)
+        self.assertIn("collisions: [1, 2]", result.failures[0][1])
+
+
+if __name__ == "__main__":
+    unittest.main()
