@@ -7,7 +7,6 @@ import pathlib
 import sys
 import tempfile
 import time
-import unittest
 
 import rospy
 import rostest
@@ -15,14 +14,14 @@ from std_srvs.srv import Trigger
 from understory_msgs.msg import FlightStatus, MissionStatus
 from understory_msgs.srv import SaveMap
 
-from watching import PATIENCE_S, Onboard, Topic, position_m, speed_mps
+from watching import PATIENCE_S, FlightTest, Onboard, Topic, position_m, speed_mps
 
 STILL_MPS = 0.05
 REST_PATIENCE_S = 4.0
 WATCHED_S = 2.0
 
 
-class CallServices(unittest.TestCase):
+class CallServices(FlightTest):
     def setUp(self):
         self.onboard = Onboard(self.id().rsplit(".", 1)[-1])
         self.addCleanup(lambda: print(self.onboard.end(), file=sys.stderr))

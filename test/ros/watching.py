@@ -3,8 +3,10 @@
 """For tests that look at the onboard host from another process: waiting, always with a deadline."""
 
 import collections
+import pathlib
 import signal
 import subprocess
+import sys
 import tempfile
 import threading
 import time
@@ -14,6 +16,9 @@ import roslib.packages
 import rospy
 from nav_msgs.msg import Odometry
 from understory_msgs.msg import MissionStatus
+
+sys.path.append(str(pathlib.Path(__file__).resolve().parents[1] / "support"))
+from machine import PatientTest  # noqa: E402  pylint: disable=wrong-import-position
 
 PATIENCE_S = 30.0
 MOST_BYTES = 1 << 26  # of one message, so that large ones do not arrive in small pieces
@@ -76,6 +81,12 @@ def speed_mps(odometry):
 def position_m(odometry):
     point = odometry.pose.pose.position
     return numpy.array((point.x, point.y, point.z))
+
+
+class FlightTest(PatientTest):
+    """Flies in real time, which a machine that stands still for 0.3 s ends."""
+
+    failures = (Exception,)  # what waits for ROS raises is of many kinds
 
 
 class Onboard:

@@ -11,9 +11,11 @@ import unittest
 import unittest.mock
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
-sys.path.insert(0, str(ROOT / "test" / "support"))
+sys.path[:0] = [str(ROOT / "test" / "support"), str(ROOT / "test" / "runner")]
 
 import machine  # noqa: E402
+import ros_tests  # noqa: E402
+from results import SuiteResult  # noqa: E402
 
 
 class FakeMachine:
@@ -200,6 +202,60 @@ class Tests(unittest.TestCase):
 
         self.assertEqual(len(result.failures), 1)
         self.assertIn("collisions: [1, 2]", result.failures[0][1])
+
+
+class TestFiles(unittest.TestCase):
+    """A .test file of ROS as a whole."""
+
+    def outcome_of(self, name, *machines, good=()):
+        runs = []
+        made = iter(machines)
+
+        def run_once(_):
+            runs.append(name)
+            failed = [] if len(runs) in good else [f"{name}: it fails"]
+            return SuiteResult(name, passed=2, failed=failed), 3
+
+        def attempts(act):
+            return machine.attempted(
+                act, machine_of_now=lambda: next(made)(), before_another=lambda: None
+            )
+
+        with contextlib.redirect_stdout(io.StringIO()):
+            result, count = ros_tests.outcome_of(pathlib.Path(f"{name}.test"), run_once, attempts)
+        self.assertEqual(count, 3)
+        return result, len(runs)
+
+    def test_it_runs_again_after_a_stall_and_only_the_last_run_counts(self):
+        result, runs = self.outcome_of("topics", stalled, calm, good=(2,))
+
+        self.assertEqual((result.passed, result.failed, result.skipped), (2, [], []))
+        self.assertEqual(runs, 2)
+
+    def test_a_failure_on_a_calm_machine_is_one(self):
+        result, runs = self.outcome_of("topics", calm)
+
+        self.assertEqual((result.failed, result.skipped), (["topics: it fails"], []))
+        self.assertEqual(runs, 1)
+
+    def test_on_a_hopeless_machine_what_failed_is_skipped(self):
+        result, _ = self.outcome_of("topics", hopeless, hopeless, hopeless)
+
+        self.assertEqual(result.failed, [])
+        self.assertEqual(result.passed, 2)
+        self.assertEqual(
+            result.skipped, [("topics: it fails", "it stood still; topics: it fails")]
+        )
+
+    def test_one_whose_tests_try_again_themselves_runs_once(self):
+        result, runs = self.outcome_of("robustness")
+
+        self.assertEqual(result.failed, ["robustness: it fails"])
+        self.assertEqual(runs, 1)
+
+    def test_those_are_files_that_exist(self):
+        for name in ros_tests.PATIENT:
+            self.assertTrue((ros_tests.FOLDER / f"{name}.test").exists(), name)
 
 
 if __name__ == "__main__":
