@@ -21,6 +21,7 @@ import spread
 from bench_figures import write_figures
 from rows import KEY, append_row, comparison, cost_of_variants, grouped, is_good, markdown
 from rows import read_rows, row_of
+import team_rows
 from table_file import TableError, name_of, quick, read_table
 
 ROOT = pathlib.Path(os.environ["UNDERSTORY_ROOT"])
@@ -100,8 +101,7 @@ class Bench:
         row = row_of(mission, out, said[0] if done.returncode == 2 and said else "", self.commit)
         if row["stop_reason"] == "interrupted":
             return None
-        ticks = out / "ticks.csv"
-        course = series.sampled(ticks) if ticks.exists() else None
+        course = series.sampled_of(out)
         if not self.keep_folders and is_good(row):
             shutil.rmtree(out, ignore_errors=True)
         return row, course
@@ -169,7 +169,8 @@ class Bench:
 
 def report(bench, rows, folder):
     """Writes and prints the tables, draws the figures."""
-    table = "\n".join(filter(None, [markdown(rows), comparison(rows), cost_of_variants(rows)]))
+    parts = [markdown(rows), team_rows.markdown(grouped(rows)), comparison(rows)]
+    table = "\n".join(filter(None, [*parts, cost_of_variants(rows)]))
     (folder / "table.md").write_text(table, encoding="utf-8")
     print(table, end="")
     courses = {}

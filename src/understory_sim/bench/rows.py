@@ -7,6 +7,8 @@ import errno
 import json
 import statistics
 
+import team_rows
+
 KEY = ["scene", "seed", "speed_cap", "strategy", "variant"]
 MEASURED = [
     "completed",
@@ -24,12 +26,13 @@ MEASURED = [
     "peak_rss_mb",
 ]
 DECISION = {"decision_p50_ms": "p50_ms", "decision_p99_ms": "p99_ms"}
-COLUMNS = KEY + ["title", "commit", "error"] + MEASURED + list(DECISION)
+COLUMNS = KEY + ["title", "timed", "commit", "error"] + MEASURED + list(DECISION) + team_rows.COLUMNS
 
 
 def row_of(mission, folder, error, commit):
     """The row of a mission that was flown into this folder; `error` is what it said if it failed."""
     row = dict(zip(KEY, mission.key), title=mission.title, commit=commit, error=error)
+    row["timed"] = str(mission.timed)
     try:
         result = json.loads((folder / "result.json").read_text(encoding="utf-8"))
     except (OSError, ValueError):
@@ -37,6 +40,7 @@ def row_of(mission, folder, error, commit):
     measured = {name: result.get(name) for name in MEASURED}
     decision = result.get("stages", {}).get("decision", {})
     measured.update((name, decision.get(key)) for name, key in DECISION.items())
+    measured.update(team_rows.measured(result))
     row.update((name, "" if value is None else str(value)) for name, value in measured.items())
     return row
 
@@ -68,8 +72,10 @@ def append_row(path, row):
 
 
 def is_good(row):
-    """Completed by itself, without touching anything."""
-    return row["completed"] == "True" and row["collisions"] == "0"
+    """Completed by itself, or flown until its time was over where that is wanted, without touching
+    anything."""
+    is_timed = row["timed"] == "True" and row["stop_reason"] == "time_limit"
+    return (row["completed"] == "True" or is_timed) and row["collisions"] == "0"
 
 
 def _mean(rows, name, digits):
@@ -125,7 +131,8 @@ def markdown(rows):
 def _time_ratio(rows, base):
     """Of the mean completion times of those that are good."""
     times, base_times = (
-        [float(row["completion_time_s"]) for row in group if is_good(row)] for group in (rows, base)
+        [float(row["completion_time_s"]) for row in group if is_good(row) and row["completion_time_s"]]
+        for group in (rows, base)
     )
     if not times or not base_times:
         return "-"

@@ -42,6 +42,24 @@ def sampled(ticks_path):
     return Series(covered, np.interp(seconds, times, np.array(distance[1:])))
 
 
+def sampled_of(folder):
+    """Of a mission's result folder; of a team's: what the one knows who knows most, and how far they
+    fly on average. None if there are no ticks."""
+    if (folder / "ticks.csv").exists():
+        return sampled(folder / "ticks.csv")
+    courses = [sampled(path) for path in sorted(folder.glob("vehicle_*/ticks.csv"))]
+    length = max((len(course.coverage) for course in courses), default=0)
+    if length == 0:
+        return None
+    courses = [course for course in courses if len(course.coverage) > 0]
+
+    def together(name):
+        values = [getattr(course, name) for course in courses]
+        return np.array([np.pad(one, (0, length - len(one)), mode="edge") for one in values])
+
+    return Series(together("coverage").max(axis=0), together("distance_m").mean(axis=0))
+
+
 def write(path, series):
     """Whole or not at all."""
     part = path.with_suffix(".part")

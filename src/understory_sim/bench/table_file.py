@@ -8,6 +8,7 @@
     speed_caps: [paper, strict]
     title: TEXT               of the group's line in the table (default: one line per scene)
     strategies: [NAME, ...]   of config/strategies (default: explorer_collector)
+    timed: true               missions that are over when their time is; they need not be completed
     variants: {NAME: {...}}   configuration over that of all files; one line in the table per variant,
                               unless the group has a title
 
@@ -22,7 +23,8 @@ import re
 
 import yaml
 
-KEYS = {"scenario", "scenarios", "forests", "seeds", "speed_caps", "strategies", "title", "variants"}
+KEYS = {"scenario", "scenarios", "forests", "seeds", "speed_caps", "strategies", "title", "timed"}
+KEYS |= {"variants"}
 DEFAULT_STRATEGY = "explorer_collector"
 SPEED_CAPS = ("paper", "strict")
 
@@ -48,6 +50,7 @@ class Mission:
     group: str = ""
     variant: str = ""
     settings: str = ""  # the variant's, as YAML
+    timed: bool = False
 
     @property
     def title(self):
@@ -124,8 +127,11 @@ def _group(path, content, root):
     caps = content.get("speed_caps", list(SPEED_CAPS))
     if not isinstance(caps, list) or not caps or not set(caps) <= set(SPEED_CAPS):
         raise TableError(f"{path}: speed_caps: expected a list of {', '.join(SPEED_CAPS)}")
+    timed = content.get("timed", False)
+    if not isinstance(timed, bool):
+        raise TableError(f"{path}: timed: expected true or false")
     return [
-        Mission(scenario, forest, seed, cap, strategy, content.get("title", ""), *variant)
+        Mission(scenario, forest, seed, cap, strategy, content.get("title", ""), *variant, timed)
         for variant, scenario, forest, seed, cap, strategy in itertools.product(
             _variants(path, content),
             _scenarios(path, content),
