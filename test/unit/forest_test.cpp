@@ -104,6 +104,36 @@ TEST(TrunkIndex, StaysSmallAndRightWhenTwoTrunksAreFarApart) {
   EXPECT_EQ(index.distance_m({0, 0}, 100.0), 100.0);
 }
 
+TEST(TrunkIndex, FindsTrunksInALineAsBruteForceDoes) {
+  int touched = 0;
+  for (std::uint64_t seed = 1; seed <= 10; ++seed) {
+    Rng rng(seed);
+    const Forest forest = wild_forest(rng, 60, 15.0);
+    const TrunkIndex index(forest.trunks);
+    for (int i = 0; i < 500; ++i) {
+      const Vector2d from(rng.uniform(-20, 20), rng.uniform(-20, 20));
+      Vector2d to = from + Vector2d(rng.uniform(-12, 12), rng.uniform(-12, 12));
+      if (i % 5 == 0) {
+        to[i % 2] = from[i % 2];  // along the grid
+      }
+
+      const bool found = index.touches_line(from, to);
+
+      const bool expected =
+          std::any_of(forest.trunks.begin(), forest.trunks.end(), [&](const Trunk& trunk) {
+            const Vector2d along = to - from;
+            const double t =
+                std::clamp((trunk.center_m - from).dot(along) / along.squaredNorm(), 0.0, 1.0);
+            return (from + t * along - trunk.center_m).norm() <= trunk.radius_m;
+          });
+      ASSERT_EQ(found, expected) << "seed " << seed << ", line " << i;
+      touched += found ? 1 : 0;
+    }
+  }
+  EXPECT_GT(touched, 500);
+  EXPECT_LT(touched, 4000);
+}
+
 TEST(TrunkIndex, ListsEveryTrunkThatTouchesARectangle) {
   for (std::uint64_t seed = 1; seed <= 40; ++seed) {
     Rng rng(seed);

@@ -100,6 +100,51 @@ double TrunkIndex::distance_m(const Vector2d& point_m, double max_m) const {
   return best_m;
 }
 
+bool TrunkIndex::touches_line_in_row(const Vector2d& from_m, const Vector2d& to_m, int row) const {
+  const Vector2d from = from_m - origin_m_;
+  const Vector2d along = to_m - from_m;
+  // The part of the line within the row, whose cells list every trunk that reaches into it.
+  double begin = 0.0;
+  double end = 1.0;
+  if (std::abs(along.y()) > 1e-9) {
+    const double low = (row * cell_m_ - from.y()) / along.y();
+    const double high = ((row + 1) * cell_m_ - from.y()) / along.y();
+    begin = std::clamp(std::min(low, high) - 1e-9, 0.0, 1.0);
+    end = std::clamp(std::max(low, high) + 1e-9, 0.0, 1.0);
+  }
+  const double x_begin = from.x() + begin * along.x();
+  const double x_end = from.x() + end * along.x();
+  const std::size_t first_cell = static_cast<std::size_t>(row) * static_cast<std::size_t>(count_x_);
+  const auto cell_of = [&](double x_m) {
+    return first_cell + static_cast<std::size_t>(cell_along(x_m, count_x_));
+  };
+  const std::uint32_t discs_end = first_[cell_of(std::max(x_begin, x_end)) + 1];
+  for (std::uint32_t i = first_[cell_of(std::min(x_begin, x_end))]; i < discs_end; ++i) {
+    const Disc& disc = discs_[i];
+    const Vector2d to_disc = Vector2d(disc.x_m, disc.y_m) - from_m;
+    const double squared = std::max(along.squaredNorm(), 1e-18);
+    const double nearest = std::clamp(to_disc.dot(along) / squared, 0.0, 1.0);
+    if ((to_disc - nearest * along).squaredNorm() <= disc.radius_m * disc.radius_m) {
+      return true;
+    }
+  }
+  return false;
+}
+
+bool TrunkIndex::touches_line(const Vector2d& from_m, const Vector2d& to_m) const {
+  if (discs_.empty()) {
+    return false;
+  }
+  const int row_from = cell_along(from_m.y() - origin_m_.y(), count_y_);
+  const int row_to = cell_along(to_m.y() - origin_m_.y(), count_y_);
+  for (int row = std::min(row_from, row_to); row <= std::max(row_from, row_to); ++row) {
+    if (touches_line_in_row(from_m, to_m, row)) {
+      return true;
+    }
+  }
+  return false;
+}
+
 std::vector<std::size_t> TrunkIndex::touching(const Box2d& rectangle_m) const {
   std::vector<std::size_t> found;
   if (discs_.empty() || rectangle_m.isEmpty()) {

@@ -22,6 +22,9 @@ class TrunkIndex {
   // `max_m` when none is nearer than that.
   [[nodiscard]] double distance_m(const Vector2d& point_m, double max_m) const;
 
+  // Whether a trunk touches the straight line between two points.
+  [[nodiscard]] bool touches_line(const Vector2d& from_m, const Vector2d& to_m) const;
+
   // Indices into the constructor's list, ascending, of trunks that touch the rectangle.
   [[nodiscard]] std::vector<std::size_t> touching(const Box2d& rectangle_m) const;
 
@@ -34,6 +37,9 @@ class TrunkIndex {
   };
 
   [[nodiscard]] int cell_along(double offset_m, int count) const;  // clamped into the grid
+  [[nodiscard]] bool touches_line_in_row(const Vector2d& from_m,
+                                         const Vector2d& to_m,
+                                         int row) const;
   // Looks at every cell that the square of this half size around the point meets.
   [[nodiscard]] double nearest_within(const Vector2d& p, double reach_m, double best_m) const;
 
