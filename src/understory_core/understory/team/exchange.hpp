@@ -111,7 +111,10 @@ class Exchange {
   void append_tiles(Time now, std::vector<Sample>& due);
   [[nodiscard]] std::vector<Echo> echoes(Time now) const;
   [[nodiscard]] SampleHeader next_header();
-  void append(SampleKind kind, std::uint32_t item, Encoded encoded, std::vector<Sample>& due);
+  void append(const SampleKey& key,
+              const SampleHeader& header,
+              Encoded encoded,
+              std::vector<Sample>& due);
 
   TeamConfig config_;
   GridGeometry geometry_;
