@@ -27,8 +27,13 @@ std::unique_ptr<Strategy> make_strategy(const ExplorerConfig& config,
         geometry);
   }
   const Limits limits = config.limits.limits_for(FlightMode::kCollector);
-  const TravelRates rates{
-      limits.speed_mps, limits.acceleration_mps2, limits.yaw_rate_radps, geometry.box_m()};
+  const team::TeamConfig& team = config.team;
+  const Box3d box_m = geometry.box_m();
+  const TravelRates rates{limits.speed_mps,
+                          limits.acceleration_mps2,
+                          limits.yaw_rate_radps,
+                          team.coordination.own_region ? team::region_of(team, box_m) : box_m,
+                          team.coordination};
   return std::make_unique<ExplorerCollector>(config.explorer_collector, rates);
 }
 
@@ -48,6 +53,8 @@ Limits LimitsConfig::limits_for(FlightMode mode) const {
 Explorer::Explorer(const ExplorerConfig& config, const GridGeometry& geometry)
     : config_(config),
       geometry_(geometry),
+      region_m_(config.team.coordination.split_map ? team::region_of(config.team, geometry.box_m())
+                                                   : geometry.box_m()),
       routes_(geometry, route_clearance_m(config.plan)),
       tight_routes_(geometry, config.plan.vehicle_radius_m + config.plan.margin_m),
       far_routes_(geometry, route_clearance_m(config.plan)),
@@ -94,7 +101,7 @@ bool Explorer::reaches_target(const Pilot& pilot) const {
 bool Explorer::has_open_clusters() const {
   return std::any_of(
       finder_.clusters().begin(), finder_.clusters().end(), [this](const ClusterPtr& cluster) {
-        return !cluster->is_dormant() && !set_aside_.is_given_up(*cluster);
+        return !cluster->is_dormant() && is_ours(*cluster);
       });
 }
 
@@ -135,8 +142,9 @@ StrategyInput Explorer::gather(const Pilot& pilot, Time now, Reach reach) {
   input.vehicle = pilot.next_start_point(now);
   input.mode = mode_;
   input.target = target_ ? target_->candidate.cluster : nullptr;
+  input.peers = peers_;
   for (const ClusterPtr& cluster : finder_.clusters()) {
-    if (set_aside_.is_given_up(*cluster) ||
+    if (!is_ours(*cluster) ||
         (reach < Reach::kAllAndSetAside && set_aside_.is_waiting(*cluster, now))) {
       continue;
     }
@@ -253,6 +261,7 @@ TrajectoryPtr Explorer::try_targets(
       return nullptr;
     }
     const bool is_reachable = has_route(routes, input, *target);
+    bool is_passing = false;  // what was in the way
     if (is_reachable) {
       const Result<TrajectoryPtr, PlanError> flown =
           pilot.fly({routes.route_m(target->candidate.viewpoint.node),
@@ -265,9 +274,11 @@ TrajectoryPtr Explorer::try_targets(
         adopt(*target, pilot, now);
         return *flown;
       }
+      is_passing = flown.error() == PlanError::kTraffic &&
+                   !pilot.traffic().is_occupied(target->candidate.viewpoint.position_m, now);
     }
     // From motion a plan may fail that works from rest; only then is the target to blame.
-    if (is_reachable && pilot.is_at_rest(now)) {
+    if (is_reachable && !is_passing && pilot.is_at_rest(now)) {
       counters_.given_up += set_aside_.add(*target->candidate.cluster, now) ? 1U : 0U;
       ++counters_.set_aside;
     }

@@ -44,6 +44,8 @@ class Explorer {
 
   // With every map update: what is frontier now. Clusters are formed when a decision is due.
   void observe(const MapSnapshotPtr& snapshot);
+  // What is known of team mates now.
+  void set_peers(team::Peers peers) { peers_ = std::move(peers); }
   // Call after observe(), with the pilot on the same map.
   ExploreStep step(Pilot& pilot, Time now);
 
@@ -67,6 +69,9 @@ class Explorer {
     std::optional<Target> target;
   };
 
+  [[nodiscard]] bool is_ours(const Cluster& cluster) const {
+    return region_m_.contains(cluster.mean_m) && !set_aside_.is_given_up(cluster);
+  }
   [[nodiscard]] bool is_sluggish(const Pilot& pilot, Time now) const;
   [[nodiscard]] bool is_due(const Pilot& pilot, Time now) const;
   [[nodiscard]] bool reaches_target(const Pilot& pilot) const;
@@ -86,6 +91,8 @@ class Explorer {
 
   ExplorerConfig config_;
   GridGeometry geometry_;
+  Box3d region_m_;  // clusters outside of it are not flown to
+  team::Peers peers_;
   RouteSearch routes_;
   RouteSearch tight_routes_;
   CoarseRoutes far_routes_;

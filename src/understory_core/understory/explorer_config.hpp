@@ -13,6 +13,7 @@
 #include "understory/sense/camera_model.hpp"
 #include "understory/strategy/explorer_collector.hpp"
 #include "understory/strategy/fuel.hpp"
+#include "understory/team/team_config.hpp"
 
 namespace understory {
 
@@ -113,6 +114,7 @@ struct ExplorerConfig {
   std::string strategy = "explorer_collector";
   ExplorerCollectorConfig explorer_collector;
   FuelConfig fuel;
+  team::TeamConfig team;
 
   void visit(FieldVisitor& f) {
     f.section("camera", camera, "The depth camera.");
@@ -129,6 +131,7 @@ struct ExplorerConfig {
             "as printed go by (config/strategies)");
     f.section("explorer_collector", explorer_collector, "The paper's strategy.");
     f.section("fuel", fuel, "The paper's baseline: the shortest tour over all clusters.");
+    f.section("team", team, "Other vehicles that explore the same box.");
   }
 };
 

@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <limits>
 
+#include "understory/team/coordination.hpp"
+
 namespace understory {
 namespace {
 
@@ -15,6 +17,11 @@ constexpr double kConfirmNothingLeftS = 2.0;
 constexpr double kArrivedM = 0.25;
 constexpr double kRetryIntervalS = 0.5;
 constexpr double kHeadroomM = 0.5;
+
+// Who is in the way may go away by itself.
+bool is_lasting(PlanError error) {
+  return error != PlanError::kTraffic;
+}
 
 }  // namespace
 
@@ -194,7 +201,7 @@ TrajectoryPtr Mission::fly_leg(const Vector3d& to_m, Time now) {
                   FlightMode::kTransit,
                   explorer_config_.limits.limits_for(FlightMode::kExplorer)},
                  now);
-  failed_legs_ = flown ? 0 : failed_legs_ + 1;
+  failed_legs_ = flown ? 0 : failed_legs_ + (is_lasting(flown.error()) ? 1 : 0);
   return flown ? *flown : nullptr;
 }
 
@@ -260,6 +267,7 @@ TrajectoryPtr Mission::fly_home(Time now) {
     routes.run(
         pilot_.clearance(), here.position_m, {home}, std::numeric_limits<double>::infinity());
     std::vector<Vector3d> route = routes.route_m(home);
+    bool is_barred = true;
     if (!route.empty()) {
       const Result<TrajectoryPtr, PlanError> flown =
           pilot_.fly({std::move(route),
@@ -268,8 +276,13 @@ TrajectoryPtr Mission::fly_home(Time now) {
                       explorer_config_.limits.limits_for(FlightMode::kTransit)},
                      now);
       leg = flown ? *flown : nullptr;
+      is_barred = !flown && is_lasting(flown.error());
     }
-    failed_legs_ = leg || !pilot_.is_at_rest(now) ? 0 : failed_legs_ + 1;
+    if (leg || !pilot_.is_at_rest(now)) {
+      failed_legs_ = 0;
+    } else if (is_barred) {
+      ++failed_legs_;
+    }
   }
   if (in_danger && !leg) {
     const Result<TrajectoryPtr, PlanError> braked = pilot_.brake(now);
@@ -294,6 +307,11 @@ TrajectoryPtr Mission::descend(Time now) {
   return to_seconds(now - last_leg_) < kRetryIntervalS
              ? nullptr
              : fly_leg({here.x(), here.y(), lowest_m}, now);
+}
+
+void Mission::set_peers(const team::Peers& peers, Time now) {
+  pilot_.set_traffic(team::traffic_of(explorer_config_.team, peers, now));
+  explorer_.set_peers(peers);
 }
 
 MissionStep Mission::on_map(const MapSnapshotPtr& snapshot, Time now) {

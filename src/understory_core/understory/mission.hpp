@@ -80,6 +80,8 @@ class Mission {
           Time now);
 
   MissionStep on_map(const MapSnapshotPtr& snapshot, Time now);
+  // What is known of team mates now; before on_map().
+  void set_peers(const team::Peers& peers, Time now);
   // Brakes, and stays where it is. Once it is over, nothing more happens.
   TrajectoryPtr stop(StopReason reason, Time now);
 

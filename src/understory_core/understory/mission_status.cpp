@@ -32,6 +32,7 @@ MissionStatus status_of(const Mission& mission, Time now) {
   status.counters = {{"failed_plans", pilot.counters().failed_plans},
                      {"brakes", pilot.counters().brakes},
                      {"failed_brakes", pilot.counters().failed_brakes},
+                     {"traffic_conflicts", pilot.counters().traffic_conflicts},
                      {"decisions", explorer.counters().decisions},
                      {"full_searches", explorer.counters().full_searches},
                      {"set_aside", explorer.counters().set_aside},

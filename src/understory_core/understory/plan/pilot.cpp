@@ -36,7 +36,7 @@ std::optional<Time> Pilot::unsafe_from(Time now) const {
       return unsafe;
     }
   }
-  return std::nullopt;
+  return traffic_.must_give_way_at(*follower_.newest(), now);
 }
 
 Result<TrajectoryPtr, PlanError> Pilot::fly(const FlightGoal& goal, Time now) {
@@ -53,6 +53,10 @@ Result<TrajectoryPtr, PlanError> Pilot::fly(const FlightGoal& goal, Time now) {
   if (!planned) {
     ++counters_.failed_plans;
     return planned.error();
+  }
+  if (traffic_.blocks(*planned)) {
+    ++counters_.traffic_conflicts;
+    return PlanError::kTraffic;
   }
   return accept(std::move(planned).value(), now);
 }

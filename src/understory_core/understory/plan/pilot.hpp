@@ -11,6 +11,7 @@
 #include <optional>
 #include <vector>
 
+#include "understory/plan/traffic.hpp"
 #include "understory/plan/trajectory_follower.hpp"
 #include "understory/plan/trajectory_planner.hpp"
 
@@ -30,6 +31,7 @@ struct PilotCounters {
   std::uint64_t brakes = 0;
   std::uint64_t failed_brakes = 0;
   std::uint64_t unsafe_checks = 0;
+  std::uint64_t traffic_conflicts = 0;  // plans that others were in the way of
 };
 
 class Pilot {
@@ -41,6 +43,9 @@ class Pilot {
 
   void update_map(const MapSnapshotPtr& snapshot) { clearance_.update(snapshot); }
   [[nodiscard]] const ClearanceMap& clearance() const { return clearance_; }
+  // Who else flies here, as known now.
+  void set_traffic(Traffic traffic) { traffic_ = std::move(traffic); }
+  [[nodiscard]] const Traffic& traffic() const { return traffic_; }
 
   // Where a trajectory planned now begins.
   [[nodiscard]] Time next_start(Time now) const { return now + lead_; }
@@ -48,7 +53,8 @@ class Pilot {
     return follower_.sample(next_start(now));
   }
 
-  // When what is being flown first comes too close to something, as the newest map has it.
+  // When what is being flown first comes too close to something, as the newest map has it, or has
+  // to have given way to someone.
   [[nodiscard]] std::optional<Time> unsafe_from(Time now) const;
 
   Result<TrajectoryPtr, PlanError> fly(const FlightGoal& goal, Time now);
@@ -67,6 +73,7 @@ class Pilot {
   Duration lead_;
   TrajectoryPlanner planner_;
   ClearanceMap clearance_;
+  Traffic traffic_;
   TrajectoryFollower follower_;
   PilotCounters counters_;
   std::uint64_t next_id_ = 1;

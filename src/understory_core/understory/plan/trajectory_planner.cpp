@@ -168,6 +168,8 @@ const char* to_string(PlanError error) {
       return "limits cannot be held";
     case PlanError::kUnsafe:
       return "no safe trajectory";
+    case PlanError::kTraffic:
+      return "traffic";
     case PlanError::kBudgetSpent:
       return "budget spent";
   }

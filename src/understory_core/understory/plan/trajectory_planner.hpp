@@ -49,7 +49,15 @@ struct PlanConfig {
   }
 };
 
-enum class PlanError { kStartBlocked, kGoalBlocked, kNoRoute, kLimits, kUnsafe, kBudgetSpent };
+enum class PlanError {
+  kStartBlocked,
+  kGoalBlocked,
+  kNoRoute,
+  kLimits,
+  kUnsafe,
+  kBudgetSpent,
+  kTraffic
+};
 [[nodiscard]] const char* to_string(PlanError error);
 
 struct PlanRequest {

@@ -83,7 +83,8 @@ double ExplorerCollector::greedy_cost(const StrategyInput& input,
   const double label_cost = candidate.cluster->is_trail() ? weights.trail_penalty : 0.0;
   return weights.distance_weight * candidate.route_length_m + weights.label_weight * label_cost +
          weights.ring_weight * ring_m(candidate.cluster->mean_m) +
-         weights.yaw_weight * yaw_time_s(input, candidate);
+         weights.yaw_weight * yaw_time_s(input, candidate) +
+         shared_cost(input, candidate, FlightMode::kExplorer);
 }
 
 // Half the edge of the ring around the box's middle that a place lies on, rings having the box's
@@ -105,7 +106,16 @@ double ExplorerCollector::collector_cost(const StrategyInput& input,
   const double path_time_s = candidate.route_length_m / rates_.collector_speed_mps;
   return config_.collector.path_weight * path_time_s +
          config_.collector.yaw_weight * yaw_time_s(input, candidate) +
-         config_.collector.momentum_weight * momentum_time_s(input, candidate.viewpoint.position_m);
+         config_.collector.momentum_weight *
+             momentum_time_s(input, candidate.viewpoint.position_m) +
+         shared_cost(input, candidate, FlightMode::kCollector);
+}
+
+double ExplorerCollector::shared_cost(const StrategyInput& input,
+                                      const Candidate& candidate,
+                                      FlightMode mode) const {
+  return team::team_cost(
+      rates_.team, {candidate.viewpoint.position_m, candidate.route_length_m, mode}, input.peers);
 }
 
 // What of the velocity does not lead to the target has to be braked away first.

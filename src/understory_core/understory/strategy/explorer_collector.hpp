@@ -8,6 +8,7 @@
 
 #include "understory/base/config.hpp"
 #include "understory/strategy/strategy.hpp"
+#include "understory/team/coordination.hpp"
 
 namespace understory {
 
@@ -127,12 +128,13 @@ struct ExplorerCollectorConfig {
   }
 };
 
-// What the costs need to know of vehicle and box.
+// What the costs need to know of vehicle, team and box.
 struct TravelRates {
   double collector_speed_mps = 1.5;
   double collector_acceleration_mps2 = 1.0;
   double yaw_rate_radps = 0.9;
-  Box3d box_m{Vector3d::Constant(-10.0), Vector3d::Constant(10.0)};
+  Box3d box_m{Vector3d::Constant(-10.0), Vector3d::Constant(10.0)};  // the vehicle's part of it
+  team::CoordinationConfig team{};
 };
 
 class ExplorerCollector final : public Strategy {
@@ -149,6 +151,9 @@ class ExplorerCollector final : public Strategy {
 
  private:
   [[nodiscard]] bool is_near_trail(const StrategyInput& input, const Candidate& candidate) const;
+  [[nodiscard]] double shared_cost(const StrategyInput& input,
+                                   const Candidate& candidate,
+                                   FlightMode mode) const;
   [[nodiscard]] double yaw_time_s(const StrategyInput& input, const Candidate& candidate) const;
   [[nodiscard]] double ring_m(const Vector3d& position_m) const;
   [[nodiscard]] double momentum_time_s(const StrategyInput& input,

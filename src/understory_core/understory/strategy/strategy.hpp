@@ -12,6 +12,7 @@
 #include "understory/frontier/cluster.hpp"
 #include "understory/plan/clearance_map.hpp"
 #include "understory/plan/trajectory.hpp"
+#include "understory/team/peer.hpp"
 
 namespace understory {
 
@@ -29,6 +30,7 @@ struct StrategyInput {
   TrajectoryPoint vehicle;   // where the next trajectory starts
   FlightMode mode = FlightMode::kExplorer;  // so far
   ClusterPtr target;                        // so far; null: none
+  team::Peers peers;                        // none: it is alone
 };
 
 struct Target {

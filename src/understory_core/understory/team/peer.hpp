@@ -5,11 +5,15 @@
 // vehicle's clock. A value.
 #pragma once
 
+#include <cstdint>
 #include <optional>
 #include <vector>
 
-#include "understory/mission.hpp"
 #include "understory/plan/trajectory.hpp"
+
+namespace understory {
+enum class MissionState : std::uint8_t;  // of mission.hpp, which knows team mates
+}
 
 namespace understory::team {
 
@@ -21,10 +25,20 @@ struct Peer {
   Vector3d velocity_mps = Vector3d::Zero();
   double yaw_rad = 0.0;
   FlightMode mode = FlightMode::kExplorer;
-  MissionState state = MissionState::kWaiting;
+  MissionState state{};
   std::optional<Vector3d> target_m;
   TrajectoryPtr trajectory;  // null: none has arrived; its times are mapped to this clock
   bool in_contact = true;    // false: silent for longer than the configuration bears
+
+  // Did it fly what it said it would, when last heard?
+  [[nodiscard]] bool is_on_trajectory() const {
+    constexpr double kStrayM = 1.0;
+    return trajectory != nullptr &&
+           (trajectory->sample(stated_at).position_m - position_m).norm() < kStrayM;
+  }
+  [[nodiscard]] Vector3d position_at(Time time) const {
+    return is_on_trajectory() ? trajectory->sample(time).position_m : position_m;
+  }
 };
 
 // By id, without the vehicle itself.

@@ -49,7 +49,8 @@ struct CoordinationConfig {
   double repulsion = 1.0;
   double inner_radius_m = 2.0;
   double outer_radius_m = 5.0;
-  double region_weight = 0.0;
+  bool own_region = true;
+  bool split_map = false;
   double claim_weight = 0.0;
 
   void visit(FieldVisitor& f) {
@@ -65,11 +66,10 @@ struct CoordinationConfig {
             outer_radius_m,
             in_range(0.2, 1000.0),
             "d_0: from here on there is none; greater than d_c");
-    f.field("region_weight",
-            region_weight,
-            in_range(0.0, 1000.0),
-            "per metre that a target lies outside the vehicle's own part of the box; not in the "
-            "paper");
+    f.field("own_region",
+            own_region,
+            "the box is divided among the vehicles, and each begins in its part; not in the paper");
+    f.field("split_map", split_map, "and never leaves it, as with a map split beforehand");
     f.field("claim_weight",
             claim_weight,
             in_range(0.0, 1000.0),

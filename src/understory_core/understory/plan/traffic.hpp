@@ -1,0 +1,54 @@
+// Copyright 2026 the Understory authors
+// SPDX-License-Identifier: BSD-3-Clause
+//
+// What else flies: spheres on trajectories that others have told of, or at the last place they were
+// seen. World frame, SI units. A value; one thread; cannot fail. Distances are between centres.
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "understory/plan/trajectory.hpp"
+
+namespace understory {
+
+struct Mover {
+  TrajectoryPtr trajectory;  // null: it stays where it is
+  Vector3d position_m = Vector3d::Zero();
+  double extra_m = 0.0;  // its place is known no better than this
+  bool has_way = false;  // who meets it gives way
+
+  [[nodiscard]] Vector3d position_at(Time time) const {
+    return trajectory ? trajectory->sample(time).position_m : position_m;
+  }
+  [[nodiscard]] bool is_at_rest(Time time) const {
+    return trajectory == nullptr || time >= trajectory->end();
+  }
+};
+
+struct TrafficDistances {
+  double plan_m = 1.6;     // kept by what is planned
+  double recheck_m = 1.2;  // what is flown gives way below this
+};
+
+class Traffic {
+ public:
+  Traffic() = default;
+  Traffic(std::vector<Mover> movers, const TrafficDistances& distances)
+      : movers_(std::move(movers)), distances_(distances) {}
+
+  // Does this trajectory, flown from its start to its end and rested on, come too near to anyone?
+  // Who is too near already may leave, but come no nearer.
+  [[nodiscard]] bool blocks(const Trajectory& planned) const;
+  // When who flies this from `now` on must have given way: to who has way, to who stands still,
+  // and to everyone when there is no time left to wait for the other.
+  [[nodiscard]] std::optional<Time> must_give_way_at(const Trajectory& flown, Time now) const;
+  // Does someone who stands still bar this place?
+  [[nodiscard]] bool is_occupied(const Vector3d& position_m, Time now) const;
+
+ private:
+  std::vector<Mover> movers_;
+  TrafficDistances distances_;
+};
+
+}  // namespace understory

@@ -1,0 +1,113 @@
+// Copyright 2026 the Understory authors
+// SPDX-License-Identifier: BSD-3-Clause
+#include "understory/plan/traffic.hpp"
+
+#include <gtest/gtest.h>
+
+namespace understory {
+namespace {
+
+constexpr TrafficDistances kDistances{1.6, 1.2};
+
+// At a steady pace from one place to another, then rested there.
+TrajectoryPtr line(const Vector3d& from_m, const Vector3d& to_m, double start_s = 0.0) {
+  auto flown = std::make_shared<Trajectory>();
+  flown->start = Time{} + duration_from_seconds(start_s);
+  const double length_m = (to_m - from_m).norm();
+  const int pieces = std::max(1, static_cast<int>(length_m / 0.1));  // 1 m/s
+  for (int i = -1; i <= pieces + 2; ++i) {
+    const double share = std::clamp(static_cast<double>(i) / pieces, 0.0, 1.0);
+    flown->position.control_points.emplace_back(from_m + share * (to_m - from_m));
+  }
+  flown->yaw.control_points.assign(4, 0.0);
+  return flown;
+}
+
+Traffic with(TrajectoryPtr trajectory, bool has_way = false) {
+  Mover mover;
+  mover.position_m = trajectory->sample(trajectory->start).position_m;
+  mover.trajectory = std::move(trajectory);
+  mover.has_way = has_way;
+  return {{mover}, kDistances};
+}
+
+Traffic with_standing(const Vector3d& position_m, double extra_m = 0.0) {
+  Mover mover;
+  mover.position_m = position_m;
+  mover.extra_m = extra_m;
+  return {{mover}, kDistances};
+}
+
+TEST(Traffic, BlocksWhatMeetsSomeone) {
+  const TrajectoryPtr eastward = line({0, 0, 1}, {10, 0, 1});
+
+  EXPECT_TRUE(with(line({10, 0, 1}, {0, 0, 1})).blocks(*eastward));
+  EXPECT_TRUE(with(line({5, 5, 1}, {5, -5, 1})).blocks(*eastward));
+  EXPECT_FALSE(with(line({10, 3, 1}, {0, 3, 1})).blocks(*eastward));
+}
+
+TEST(Traffic, DoesNotBlockWhatCrossesAfterTheOtherHasPassed) {
+  const TrajectoryPtr eastward = line({0, 0, 1}, {10, 0, 1});
+
+  // The other is at the crossing after one second, this one after five.
+  EXPECT_FALSE(with(line({5, 1, 1}, {5, -9, 1})).blocks(*eastward));
+}
+
+TEST(Traffic, BlocksAnEndWhereTheOtherComesLater) {
+  const TrajectoryPtr short_way = line({0, 0, 1}, {2, 0, 1});
+
+  EXPECT_TRUE(with(line({12, 0, 1}, {2, 0, 1})).blocks(*short_way));
+}
+
+TEST(Traffic, BlocksWhatPassesSomeoneWhoStands) {
+  const TrajectoryPtr eastward = line({0, 0, 1}, {10, 0, 1});
+
+  EXPECT_TRUE(with_standing({5, 1, 1}).blocks(*eastward));
+  EXPECT_FALSE(with_standing({5, 1.7, 1}).blocks(*eastward));
+  EXPECT_TRUE(with_standing({5, 1.7, 1}, 0.2).blocks(*eastward));
+}
+
+TEST(Traffic, WhoIsTooNearAlreadyMayLeaveButComeNoNearer) {
+  const Traffic beside = with_standing({1.0, 0.0, 1.0});
+
+  EXPECT_FALSE(beside.blocks(*line({0, 0, 1}, {-5, 0, 1})));
+  EXPECT_TRUE(beside.blocks(*line({0, 0, 1}, {0.5, 0, 1})));
+}
+
+TEST(Traffic, OnlyOneOfTwoGivesWayWhileThereIsTime) {
+  const TrajectoryPtr eastward = line({0, 0, 1}, {20, 0, 1});
+  const TrajectoryPtr westward = line({20, 0, 1}, {0, 0, 1});
+
+  const std::optional<Time> ours = with(westward, true).must_give_way_at(*eastward, Time{});
+
+  ASSERT_TRUE(ours);
+  EXPECT_NEAR(to_seconds(*ours), 9.4, 0.2);
+  EXPECT_FALSE(with(westward, false).must_give_way_at(*eastward, Time{}));
+}
+
+TEST(Traffic, InTheLastMomentBothGiveWay) {
+  const TrajectoryPtr eastward = line({0, 0, 1}, {20, 0, 1});
+  const TrajectoryPtr westward = line({20, 0, 1}, {0, 0, 1});
+  const Time late{std::chrono::milliseconds(7500)};
+
+  EXPECT_TRUE(with(westward, false).must_give_way_at(*eastward, late));
+}
+
+TEST(Traffic, WhoStandsNeverGivesWayAndIsAlwaysGivenIt) {
+  const TrajectoryPtr eastward = line({0, 0, 1}, {20, 0, 1});
+  const TrajectoryPtr standing = line({10, 0, 1}, {10, 0, 1});
+
+  EXPECT_TRUE(with(standing, false).must_give_way_at(*eastward, Time{}));
+  EXPECT_TRUE(with_standing({10, 0, 1}).must_give_way_at(*eastward, Time{}));
+}
+
+TEST(Traffic, NobodyIsNoTraffic) {
+  const TrajectoryPtr eastward = line({0, 0, 1}, {20, 0, 1});
+
+  EXPECT_FALSE(Traffic().blocks(*eastward));
+  EXPECT_FALSE(Traffic().must_give_way_at(*eastward, Time{}));
+  EXPECT_FALSE(Traffic().is_occupied(Vector3d::Zero(), Time{}));
+}
+
+}  // namespace
+}  // namespace understory
