@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "understory/sim/teammates_in_view.hpp"
+
 namespace understory {
 namespace {
 
@@ -41,7 +43,7 @@ Lockstep::Stages::Stages(StageTimes& times)
 
 // NOLINTNEXTLINE(readability-function-size): all that a mission is made of, once
 Lockstep::Lockstep(const SimulationConfig& config,
-                   const Forest& forest,
+                   std::shared_ptr<const DepthRenderer> renderer,
                    const Rng& rng,
                    const MapSnapshot* resumed,
                    StepHook on_step,
@@ -56,7 +58,7 @@ Lockstep::Lockstep(const SimulationConfig& config,
            rng,
            Time{}),
       control_(GateConfig{}, TrackingConfig{}, config.scene.box.box_m()),
-      renderer_(forest),
+      renderer_(std::move(renderer)),
       camera_(config.explorer.camera),
       body_from_optical_(body_from_optical(config.explorer.camera)),
       noise_rng_(rng.fork("depth noise")),
@@ -105,10 +107,28 @@ void Lockstep::fly_until(Time exposure) {
   }
 }
 
-DepthImage Lockstep::expose(const Pose& world_from_optical) {
-  return add_noise(renderer_.render(camera_, world_from_optical, std::move(image_)),
-                   config_.depth_noise,
-                   noise_rng_);
+DepthImage Lockstep::expose(const Pose& world_from_optical, const std::vector<Vector3d>& others_m) {
+  DepthImage image = renderer_->render(camera_, world_from_optical, std::move(image_));
+  if (!others_m.empty()) {
+    image = add_teammates(std::move(image),
+                          camera_,
+                          world_from_optical,
+                          others_m,
+                          config_.explorer.plan.vehicle_radius_m);
+  }
+  return add_noise(std::move(image), config_.depth_noise, noise_rng_);
+}
+
+MapSnapshotPtr Lockstep::update_map() {
+  const Pose world_from_optical = world_from_body(bus_.vehicle().odometry()) * body_from_optical_;
+  if (member_) {
+    image_ = member_->mask(std::move(image_), camera_, world_from_optical, now_);
+  }
+  // A frame that cannot be integrated changes nothing; the mission flies on with the map it has.
+  if (!mapper_.integrate(camera_, image_.view(), world_from_optical, now_)) {
+    ++skipped_frames_;
+  }
+  return mapper_.publish();
 }
 
 MissionStep Lockstep::decide(const MapSnapshotPtr& map) {
@@ -120,28 +140,36 @@ MissionStep Lockstep::decide(const MapSnapshotPtr& map) {
 }
 
 LockstepFrame Lockstep::advance() {
+  fly_to_next_exposure();
+  return see_and_decide({});
+}
+
+void Lockstep::fly_to_next_exposure() {
   const double frame_s = 1.0 / config_.explorer.camera.rate_hz;
   const Time exposure{duration_from_seconds(static_cast<double>(frame_++) * frame_s)};
-  {
-    const StageTimer timer(times_, stages_.flight);
-    fly_until(exposure);
-  }
+  const StageTimer timer(times_, stages_.flight);
+  fly_until(exposure);
+}
+
+LockstepFrame Lockstep::see_and_decide(const std::vector<Vector3d>& others_m) {
   {
     const StageTimer timer(times_, stages_.camera);
-    image_ = expose(world_from_body(vehicle()) * body_from_optical_);
+    image_ = expose(world_from_body(vehicle()) * body_from_optical_, others_m);
   }
-  const Pose world_from_optical = world_from_body(bus_.vehicle().odometry()) * body_from_optical_;
   LockstepFrame frame;
   frame.time = now_;
   {
     const StageTimer timer(times_, stages_.map);
-    // A frame that cannot be integrated changes nothing; the mission flies on with the map it has.
-    if (!mapper_.integrate(camera_, image_.view(), world_from_optical, now_)) {
-      ++skipped_frames_;
-    }
-    frame.map = mapper_.publish();
+    frame.own_map = update_map();
+    frame.map = member_ ? member_->fuse(*frame.own_map, now_) : frame.own_map;
+  }
+  if (member_) {
+    mission_.set_peers(member_->peers(now_), now_);
   }
   frame.step = decide(frame.map);
+  if (member_) {
+    member_->tell(bus_.vehicle().odometry(), mission_, now_);
+  }
   if (!mission_.is_over()) {
     over_since_ = now_;
   }

@@ -18,12 +18,14 @@
 #include "understory/sim/simulated_bus.hpp"
 #include "understory/sim/simulation_config.hpp"
 #include "understory/sim/stage_times.hpp"
+#include "understory/sim/team_member.hpp"
 
 namespace understory {
 
 struct LockstepFrame {
   Time time{};
-  MapSnapshotPtr map;
+  MapSnapshotPtr map;      // what decisions are made on
+  MapSnapshotPtr own_map;  // what of it the vehicle has seen itself
   MissionStep step;
 };
 
@@ -34,14 +36,21 @@ class Lockstep {
   // `resumed`: go on from this map instead of an unknown one. `on_step` sees the true vehicle at
   // every physics step; `times` collects wall times per stage.
   Lockstep(const SimulationConfig& config,
-           const Forest& forest,
+           std::shared_ptr<const DepthRenderer> renderer,
            const Rng& rng,
            const MapSnapshot* resumed,
            StepHook on_step,
            StageTimes& times);
 
+  // From now on it works with a team.
+  void join(std::unique_ptr<TeamMember> member) { member_ = std::move(member); }
+  [[nodiscard]] const TeamMember* member() const { return member_.get(); }
+
   // Flies to the next exposure and through the decision that follows from it.
   LockstepFrame advance();
+  // The same in two steps, between which others fly too; then they are where it may see them.
+  void fly_to_next_exposure();
+  LockstepFrame see_and_decide(const std::vector<Vector3d>& others_m);
 
   // The autopilot has set the vehicle down, or it hovers where it was stopped, or it has had ample
   // time for either.
@@ -68,7 +77,9 @@ class Lockstep {
   };
 
   void fly_until(Time exposure);
-  [[nodiscard]] DepthImage expose(const Pose& world_from_optical);
+  [[nodiscard]] DepthImage expose(const Pose& world_from_optical,
+                                  const std::vector<Vector3d>& others_m);
+  [[nodiscard]] MapSnapshotPtr update_map();
   [[nodiscard]] MissionStep decide(const MapSnapshotPtr& map);
   void fly_tick();
   void follow_vehicle(const Telemetry& telemetry);
@@ -79,12 +90,13 @@ class Lockstep {
   Stages stages_;
   SimulatedBus bus_;
   FlightControl control_;
-  DepthRenderer renderer_;
+  std::shared_ptr<const DepthRenderer> renderer_;
   CameraModel camera_;
   Pose body_from_optical_;
   Rng noise_rng_;
   Mapper mapper_;
   Mission mission_;
+  std::unique_ptr<TeamMember> member_;  // null: it is alone
   Time now_{};
   std::int64_t frame_ = 0;
   Time next_tick_{};

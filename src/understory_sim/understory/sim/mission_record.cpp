@@ -69,23 +69,21 @@ World::World(SimulationConfig wanted, std::uint64_t world_seed)
     : config(std::move(wanted)),
       seed(world_seed),
       truth(std::make_shared<const ForestTruth>(
-          build_forest(config.scene, Rng(world_seed).fork("forest")))) {}
+          build_forest(config.scene, Rng(world_seed).fork("forest"), config.explorer.team.size))) {}
 
 Vector3d World::start_m() const {
   const StartConfig& start = config.scene.start;
   return {start.x_m, start.y_m, start.z_m};
 }
 
-std::shared_ptr<const CoverageTruth> World::coverage_truth() const {
+std::shared_ptr<const CoverageTruth> World::coverage_truth(
+    const std::vector<Vector3d>& starts_m) const {
   if (!truth) {
     return nullptr;
   }
   const GridGeometry geometry(config.explorer.map.resolution_m, config.scene.box.box_m());
-  return std::make_shared<const CoverageTruth>(*truth,
-                                               geometry,
-                                               std::vector<Vector3d>{start_m()},
-                                               config.explorer.camera,
-                                               config.explorer.plan.vehicle_radius_m);
+  return std::make_shared<const CoverageTruth>(
+      *truth, geometry, starts_m, config.explorer.camera, config.explorer.plan.vehicle_radius_m);
 }
 
 MissionRecord::MissionRecord(const World& world,

@@ -12,6 +12,7 @@
 #include <memory>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "understory/mission_status.hpp"
 #include "understory/sim/forest_truth.hpp"
@@ -31,8 +32,13 @@ struct World {
   World(SimulationConfig wanted, std::uint64_t world_seed);
   explicit World(SimulationConfig real) : config(std::move(real)) {}
   [[nodiscard]] Vector3d start_m() const;
-  // What of it can be seen; takes up to a few seconds. Null for a real one.
-  [[nodiscard]] std::shared_ptr<const CoverageTruth> coverage_truth() const;
+  // What of it can be seen from where who starts there can fly; takes up to a few seconds. Null for
+  // a real one.
+  [[nodiscard]] std::shared_ptr<const CoverageTruth> coverage_truth(
+      const std::vector<Vector3d>& starts_m) const;
+  [[nodiscard]] std::shared_ptr<const CoverageTruth> coverage_truth() const {
+    return coverage_truth({start_m()});
+  }
 };
 
 class MissionRecord {

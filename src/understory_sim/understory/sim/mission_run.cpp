@@ -10,7 +10,7 @@ MissionRun::MissionRun(const RunSetup& setup)
     : world_(setup.config, setup.seed), record_(world_, world_.coverage_truth(), Time{}) {
   lockstep_ = std::make_unique<Lockstep>(
       world_.config,
-      world_.truth->forest(),
+      std::make_shared<const DepthRenderer>(world_.truth->forest()),
       Rng(setup.seed),
       setup.resumed ? &*setup.resumed : nullptr,
       [record = &record_](Time time, const VehicleState& state) {

@@ -95,6 +95,29 @@ Json stages_json(const std::vector<StageStats>& stages) {
   return all;
 }
 
+Json team_json(const std::vector<TeamMateResult>& team) {
+  Json all = Json::array();
+  for (const TeamMateResult& mate : team) {
+    Json seen = Json::array();
+    for (const VolumeAt& at : mate.seen_at) {
+      seen.push_back({{"time_s", rounded(at.time_s)}, {"volume_m3", rounded(at.volume_m3)}});
+    }
+    all.push_back({{"id", mate.id},
+                   {"is_lost", mate.is_lost},
+                   {"completion_time_s", rounded(mate.completion_time_s)},
+                   {"distance_m", rounded(mate.distance_m)},
+                   {"speed_mean_mps", rounded(mate.speed_mean_mps)},
+                   {"speed_std_mps", rounded(mate.speed_std_mps)},
+                   {"seen_volume_m3", rounded(mate.seen_volume_m3)},
+                   {"seen_at", std::move(seen)},
+                   {"coverage", rounded(mate.coverage)},
+                   {"bytes_sent", mate.bytes_sent},
+                   {"bytes_per_s", rounded(mate.bytes_per_s)},
+                   {"peak_bytes_per_s", mate.peak_bytes_per_s}});
+  }
+  return all;
+}
+
 Json scene_json(const MissionResult& result) {
   Json scene;
   scene["seed"] = result.seed;
@@ -200,6 +223,10 @@ std::string to_json(const MissionResult& result) {
   json["counters"] = Json::object();
   for (const auto& [name, count] : result.counters) {
     json["counters"][name] = count;
+  }
+  if (!result.team.empty()) {
+    json["team"] = team_json(result.team);
+    json["least_separation_m"] = rounded(result.least_separation_m);
   }
   json.update(scene_json(result));
   json["realtime_factor"] = rounded(result.realtime_factor);

@@ -50,6 +50,22 @@ struct VolumeAt {
   double volume_m3 = 0.0;
 };
 
+// Of one vehicle of a team.
+struct TeamMateResult {
+  int id = 0;
+  bool is_lost = false;
+  std::optional<double> completion_time_s;
+  double distance_m = 0.0;
+  double speed_mean_mps = 0.0;
+  double speed_std_mps = 0.0;
+  double seen_volume_m3 = 0.0;  // by itself
+  std::vector<VolumeAt> seen_at;
+  double coverage = 0.0;  // of what it knows of the team's map
+  std::uint64_t bytes_sent = 0;
+  double bytes_per_s = 0.0;
+  std::uint64_t peak_bytes_per_s = 0;
+};
+
 // Keys of result.json by the same names. What never happened is null there.
 struct MissionResult {
   // Completed, and nothing is known to have been hit.
@@ -78,6 +94,8 @@ struct MissionResult {
   std::uint64_t set_aside_targets = 0;       // likewise
   std::uint64_t replans = 0;
   std::map<std::string, std::uint64_t> counters;
+  std::vector<TeamMateResult> team;          // of a team's result: distance and speed are means
+  std::optional<double> least_separation_m;  // between the centres of two vehicles
 
   std::uint64_t seed = 0;
   std::string strategy;

@@ -33,6 +33,22 @@ Forest cropped_to_scene(const Forest& forest, SceneConfig& scene) {
   return piece;
 }
 
+// Moves the start to where the vehicle has room.
+void clear_start(SceneConfig& scene, const Forest& forest) {
+  const Box3d box = scene.box.box_m();
+  const std::optional<Vector2d> start =
+      nearest_clear_point(forest,
+                          Box2d(Vector2d(box.min().head<2>()), Vector2d(box.max().head<2>())),
+                          Vector2d(scene.start.x_m, scene.start.y_m),
+                          scene.start.clearance_m);
+  if (!start) {
+    throw ForestError("scene.start: no point of the box has " +
+                      std::to_string(scene.start.clearance_m) + " m clearance to every trunk");
+  }
+  scene.start.x_m = start->x();
+  scene.start.y_m = start->y();
+}
+
 }  // namespace
 
 Box3d BoxConfig::box_m() const {
@@ -77,10 +93,37 @@ void adapt_box(SceneConfig& scene) {
   box.y_max_m = 0.5 * crop.height_m;
 }
 
-Forest build_forest(SceneConfig& scene, const Rng& rng) {
+std::vector<Vector2d> team_starts_m(const SceneConfig& scene, int team_size) {
+  const Vector3d size_m = scene.box.box_m().sizes();
+  const Vector2d along = size_m.y() > size_m.x() ? Vector2d::UnitY() : Vector2d::UnitX();
+  std::vector<Vector2d> starts_m;
+  for (int id = 0; id < team_size; ++id) {
+    const double offset_m = scene.team_spacing_m * (id - 0.5 * (team_size - 1));
+    starts_m.push_back(Vector2d(scene.start.x_m, scene.start.y_m) + offset_m * along);
+  }
+  return starts_m;
+}
+
+SceneConfig scene_of_vehicle(SceneConfig scene,
+                             const Forest& forest,
+                             const team::TeamConfig& team) {
+  const Vector2d start_m = team_starts_m(scene, team.size)[static_cast<std::size_t>(team.id)];
+  scene.start.x_m = start_m.x();
+  scene.start.y_m = start_m.y();
+  clear_start(scene, forest);
+  return scene;
+}
+
+Forest build_forest(SceneConfig& scene, const Rng& rng, int team_size) {
   Forest forest;
   if (scene.source == "generated") {
-    forest = generate_forest(scene.generator, rng);
+    GeneratorConfig generator = scene.generator;
+    if (team_size > 1) {
+      for (const Vector2d& start_m : team_starts_m(scene, team_size)) {
+        generator.starts.push_back({start_m.x(), start_m.y()});
+      }
+    }
+    forest = generate_forest(generator, rng);
   } else {
     if (scene.forest_file.empty()) {
       throw ConfigError(
@@ -94,18 +137,7 @@ Forest build_forest(SceneConfig& scene, const Rng& rng) {
   if (!scene.mesh_file.empty()) {
     forest.meshes.push_back(read_mesh(scene.mesh_file));
   }
-  const Box3d box = scene.box.box_m();
-  const std::optional<Vector2d> start =
-      nearest_clear_point(forest,
-                          Box2d(Vector2d(box.min().head<2>()), Vector2d(box.max().head<2>())),
-                          Vector2d(scene.start.x_m, scene.start.y_m),
-                          scene.start.clearance_m);
-  if (!start) {
-    throw ForestError("scene.start: no point of the box has " +
-                      std::to_string(scene.start.clearance_m) + " m clearance to every trunk");
-  }
-  scene.start.x_m = start->x();
-  scene.start.y_m = start->y();
+  clear_start(scene, forest);
   return forest;
 }
 

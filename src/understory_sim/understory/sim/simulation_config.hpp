@@ -12,6 +12,7 @@
 #include "understory/mission.hpp"
 #include "understory/sim/depth_noise.hpp"
 #include "understory/sim/forest_generator.hpp"
+#include "understory/sim/radio.hpp"
 #include "understory/sim/simulated_vehicle.hpp"
 
 namespace understory {
@@ -79,6 +80,7 @@ struct SceneConfig {
   CropConfig crop;
   BoxConfig box;
   StartConfig start;
+  double team_spacing_m = 4.0;
   GeneratorConfig generator;
 
   void visit(FieldVisitor& f) {
@@ -95,7 +97,21 @@ struct SceneConfig {
     f.section("crop", crop, "With crop_mode: rectangle. The box takes its size.");
     f.section("box", box, "What is to be explored.");
     f.section("start", start, "Where the vehicle starts.");
+    f.field("team_spacing_m",
+            team_spacing_m,
+            in_range(1.0, 1000.0),
+            "a team starts in a row along the box's longer side, this far from each other");
     f.section("generator", generator, "With source: generated.");
+  }
+};
+
+struct TeamLossConfig {
+  int id = 0;
+  double at_s = 0.0;
+
+  void visit(FieldVisitor& f) {
+    f.field("id", id, in_range(0, 31), "of the vehicle");
+    f.field("at_s", at_s, in_range(0.0, 1e6), "from then on it is silent and does not move");
   }
 };
 
@@ -108,6 +124,8 @@ struct SimulationConfig {
   can::SupervisorConfig autopilot;
   OdometryNoiseConfig odometry_noise;
   DepthNoiseConfig depth_noise;
+  RadioConfig radio;
+  std::vector<TeamLossConfig> team_losses;
   ExplorerConfig explorer;
 
   void visit(FieldVisitor& f) {
@@ -119,6 +137,8 @@ struct SimulationConfig {
     f.section("autopilot", autopilot, "What the autopilot makes of silence and odd setpoints.");
     f.section("odometry_noise", odometry_noise, "What the simulated odometry does wrong.");
     f.section("depth_noise", depth_noise, "What the simulated camera does wrong.");
+    f.section("radio", radio, "What carries words between the vehicles of a team.");
+    f.list("team_losses", team_losses, "Vehicles that fail on the way, or never start (at 0 s).");
     explorer.visit(f);
   }
 };
@@ -129,7 +149,16 @@ struct SimulationConfig {
 // Gives the box the size of the crop, centred on (0, 0); build_forest does so as well.
 void adapt_box(SceneConfig& scene);
 
+// Where the vehicles of a team would start, before trunks are in the way: in a row around the
+// scene's start, by id along the box's longer side.
+[[nodiscard]] std::vector<Vector2d> team_starts_m(const SceneConfig& scene, int team_size);
+
+// The scene as vehicle `id` of the team finds it: with its start, clear of every trunk.
+[[nodiscard]] SceneConfig scene_of_vehicle(SceneConfig scene,
+                                           const Forest& forest,
+                                           const team::TeamConfig& team);
+
 // The scene's forest in the frame of the mission; adapts box and start to a crop.
-[[nodiscard]] Forest build_forest(SceneConfig& scene, const Rng& rng);
+[[nodiscard]] Forest build_forest(SceneConfig& scene, const Rng& rng, int team_size = 1);
 
 }  // namespace understory

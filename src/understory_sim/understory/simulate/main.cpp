@@ -17,6 +17,7 @@
 #include "understory/sim/live_line.hpp"
 #include "understory/sim/mission_run.hpp"
 #include "understory/simulate/options.hpp"
+#include "understory/simulate/team_flight.hpp"
 
 namespace understory {
 namespace {
@@ -27,6 +28,10 @@ volatile std::sig_atomic_t g_interrupted = 0;  // NOLINT: the only way a signal 
 
 void on_signal(int /*signal*/) {
   g_interrupted = 1;
+}
+
+bool is_interrupted() {
+  return g_interrupted != 0;
 }
 
 void catch_signals() {
@@ -70,10 +75,36 @@ bool make_report(const std::string& folder) {
          WEXITSTATUS(status) == 0;
 }
 
-int fly_one(const Options& options) {
+MissionResult fly_alone(const RunSetup& setup, const Options& options, const std::string& folder) {
+  MissionRun run(setup);
+  std::shared_ptr<BusLog> bus_log;
+  if (!options.bus_log.empty()) {
+    bus_log = std::make_shared<BusLog>(options.bus_log);
+    run.set_tap(bus_log);
+  }
+  TickWriter ticks((fs::path(folder) / "ticks.csv").string());
+  LiveLine live(options.quiet);
+  TickRow last;
+  run.fly(is_interrupted, [&](const TickRow& row) {
+    ticks.append(row);
+    live.show(row, run.realtime_factor());
+    last = row;
+  });
+  live.finish(last, run.realtime_factor());
+  ticks.close();
+  if (bus_log) {
+    bus_log->close();
+  }
+  run.write(folder);
+  return run.result();
+}
+
+int fly(const Options& options) {
   RunSetup setup;
   setup.config = load_scenario((fs::path(project_root()) / "config").string(), options.choice);
   setup.seed = options.seed;
+  int& team_size = setup.config.explorer.team.size;
+  team_size = options.team > 0 ? options.team : team_size;
   const std::string folder =
       !options.out_dir.empty()
           ? options.out_dir
@@ -85,28 +116,11 @@ int fly_one(const Options& options) {
   }
   prepare_result_folder(folder);
   catch_signals();
-  MissionRun run(setup);
-  std::shared_ptr<BusLog> bus_log;
-  if (!options.bus_log.empty()) {
-    bus_log = std::make_shared<BusLog>(options.bus_log);
-    run.set_tap(bus_log);
+  if (team_size > 1 && !(options.resume_file.empty() && options.bus_log.empty())) {
+    throw ConfigError("--resume, --bus-log: not with a team");
   }
-  TickWriter ticks((fs::path(folder) / "ticks.csv").string());
-  LiveLine live(options.quiet);
-  TickRow last;
-  run.fly([] { return g_interrupted != 0; },
-          [&](const TickRow& row) {
-            ticks.append(row);
-            live.show(row, run.realtime_factor());
-            last = row;
-          });
-  live.finish(last, run.realtime_factor());
-  ticks.close();
-  if (bus_log) {
-    bus_log->close();
-  }
-  run.write(folder);
-  const MissionResult result = run.result();
+  const MissionResult result = team_size > 1 ? fly_team(setup, options, folder, is_interrupted)
+                                             : fly_alone(setup, options, folder);
   fmt::print("{}\n", summary_of(result));
   const bool has_report = !options.no_report && make_report(folder);
   fmt::print("{}: {}\n",
@@ -125,7 +139,7 @@ int run_main(int argc, char** argv) {
       print_parameters();
       return 0;
     }
-    return fly_one(*parsed.options);
+    return fly(*parsed.options);
   } catch (const std::exception& error) {
     fmt::print(stderr, "understory simulate: {}\n", error.what());
     return 2;

@@ -51,6 +51,8 @@ ParsedOptions parse_options(int argc, char** argv) {
   app.add_option("--set",
                  options.choice.overrides,
                  "configuration (YAML) over that of all files, as 'camera: {rate_hz: 10}'");
+  app.add_option("--team", options.team, "so many vehicles share the work")
+      ->check(CLI::Range(1, 32));
   app.add_option("--resume", options.resume_file, "go on from a saved map (.ot, .bt)");
   app.add_option("--out", options.out_dir, "result folder (default: results/SCENARIO_SEED)");
   app.add_option("--bus-log",

@@ -18,6 +18,7 @@ struct Options {
   std::string out_dir;
   std::string bus_log;
   std::uint64_t seed = 1;
+  int team = 0;  // 0: as the configuration has it
   bool quiet = false;
   bool no_report = false;
   bool print_parameters = false;
