@@ -143,7 +143,7 @@ TEST(TeamTraffic, ASilentTeamMateIsGivenMoreRoomTheLongerItIsSilent) {
   TeamConfig config;
   Peer silent = peer_at({3.0, 0.0, 1.0});
   silent.in_contact = false;
-  const Vector3d beside_m(5.0, 0.0, 1.0);
+  const Vector3d beside_m(4.5, 0.0, 1.0);
   const Time soon{std::chrono::seconds(1)};
   const Time later{std::chrono::seconds(10)};
 

@@ -7,7 +7,7 @@
 namespace understory {
 namespace {
 
-constexpr TrafficDistances kDistances{1.6, 1.2};
+constexpr TrafficDistances kDistances{1.6, 1.2, 0.9};
 
 // At a steady pace from one place to another, then rested there.
 TrajectoryPtr line(const Vector3d& from_m, const Vector3d& to_m, double start_s = 0.0) {
@@ -62,16 +62,16 @@ TEST(Traffic, BlocksAnEndWhereTheOtherComesLater) {
 TEST(Traffic, BlocksWhatPassesSomeoneWhoStands) {
   const TrajectoryPtr eastward = line({0, 0, 1}, {10, 0, 1});
 
-  EXPECT_TRUE(with_standing({5, 1, 1}).blocks(*eastward));
-  EXPECT_FALSE(with_standing({5, 1.7, 1}).blocks(*eastward));
-  EXPECT_TRUE(with_standing({5, 1.7, 1}, 0.2).blocks(*eastward));
+  EXPECT_TRUE(with_standing({5, 0.8, 1}).blocks(*eastward));
+  EXPECT_FALSE(with_standing({5, 1, 1}).blocks(*eastward));
+  EXPECT_TRUE(with_standing({5, 1, 1}, 0.2).blocks(*eastward));
 }
 
 TEST(Traffic, WhoIsTooNearAlreadyMayLeaveButComeNoNearer) {
-  const Traffic beside = with_standing({1.0, 0.0, 1.0});
+  const Traffic beside = with_standing({0.7, 0.0, 1.0});
 
   EXPECT_FALSE(beside.blocks(*line({0, 0, 1}, {-5, 0, 1})));
-  EXPECT_TRUE(beside.blocks(*line({0, 0, 1}, {0.5, 0, 1})));
+  EXPECT_TRUE(beside.blocks(*line({0, 0, 1}, {0.3, 0, 1})));
 }
 
 TEST(Traffic, OnlyOneOfTwoGivesWayWhileThereIsTime) {

@@ -10,7 +10,8 @@
 namespace understory {
 namespace {
 
-constexpr int kMaxFailedLegs = 20;
+constexpr int kStrikesPerFailure = 6;
+constexpr int kMaxStrikes = 20 * kStrikesPerFailure;
 constexpr int kMaxResumptions = 3;
 // In a tight place one map update may block every route, and the next one open it.
 constexpr double kConfirmNothingLeftS = 2.0;
@@ -18,9 +19,9 @@ constexpr double kArrivedM = 0.25;
 constexpr double kRetryIntervalS = 0.5;
 constexpr double kHeadroomM = 0.5;
 
-// Who is in the way may go away by itself.
-bool is_lasting(PlanError error) {
-  return error != PlanError::kTraffic;
+// Who is in the way may go away by itself: that is tried for longer.
+int strikes_of(PlanError error) {
+  return error == PlanError::kTraffic ? 1 : kStrikesPerFailure;
 }
 
 }  // namespace
@@ -166,7 +167,7 @@ Mission::Answer Mission::return_home(Time now) {
     end_exploration(StopReason::kReturnRequested, now);
   }
   resumptions_ = kMaxResumptions;  // whoever asks for the way home wants no more exploring
-  failed_legs_ = 0;
+  strikes_ = 0;
   state_ = MissionState::kReturnHome;
   return {true, nullptr};  // the way home begins on what is flown
 }
@@ -178,7 +179,7 @@ Mission::Answer Mission::land(Time now) {
   if (reason_ == StopReason::kNone) {
     end_exploration(StopReason::kLandRequested, now);
   }
-  failed_legs_ = 0;
+  strikes_ = 0;
   state_ = MissionState::kDescend;
   return {true, brake(now)};
 }
@@ -201,7 +202,7 @@ TrajectoryPtr Mission::fly_leg(const Vector3d& to_m, Time now) {
                   FlightMode::kTransit,
                   explorer_config_.limits.limits_for(FlightMode::kExplorer)},
                  now);
-  failed_legs_ = flown ? 0 : failed_legs_ + (is_lasting(flown.error()) ? 1 : 0);
+  strikes_ = flown ? 0 : strikes_ + strikes_of(flown.error());
   return flown ? *flown : nullptr;
 }
 
@@ -215,7 +216,7 @@ TrajectoryPtr Mission::climb(Time now) {
     return nullptr;
   }
   TrajectoryPtr leg = fly_leg({here.x(), here.y(), config_.take_off_height_m}, now);
-  if (failed_legs_ >= kMaxFailedLegs) {
+  if (strikes_ >= kMaxStrikes) {
     end_exploration(StopReason::kTakeOffFailed, now);
   }
   return leg;
@@ -250,9 +251,9 @@ void Mission::resume_at_home() {
 TrajectoryPtr Mission::fly_home(Time now) {
   const TrajectoryPoint here = pilot_.next_start_point(now);
   const bool is_home = (here.position_m - home_m_).head<2>().norm() < kArrivedM;
-  if (failed_legs_ >= kMaxFailedLegs || (pilot_.is_at_rest(now) && is_home)) {
+  if (strikes_ >= kMaxStrikes || (pilot_.is_at_rest(now) && is_home)) {
     state_ = MissionState::kDescend;
-    failed_legs_ = 0;
+    strikes_ = 0;
     return nullptr;
   }
   const double waited_s = to_seconds(now - last_leg_);
@@ -262,12 +263,13 @@ TrajectoryPtr Mission::fly_home(Time now) {
   TrajectoryPtr leg;
   if (in_danger || is_due) {
     last_leg_ = now;
-    RouteSearch& routes = failed_legs_ % 2 == 0 ? explorer_.routes() : explorer_.tight_routes();
+    RouteSearch& routes =
+        strikes_ / kStrikesPerFailure % 2 == 0 ? explorer_.routes() : explorer_.tight_routes();
     const RouteLattice::Node home = routes.lattice().nearest(home_m_);
     routes.run(
         pilot_.clearance(), here.position_m, {home}, std::numeric_limits<double>::infinity());
     std::vector<Vector3d> route = routes.route_m(home);
-    bool is_barred = true;
+    int strikes = kStrikesPerFailure;
     if (!route.empty()) {
       const Result<TrajectoryPtr, PlanError> flown =
           pilot_.fly({std::move(route),
@@ -276,13 +278,9 @@ TrajectoryPtr Mission::fly_home(Time now) {
                       explorer_config_.limits.limits_for(FlightMode::kTransit)},
                      now);
       leg = flown ? *flown : nullptr;
-      is_barred = !flown && is_lasting(flown.error());
+      strikes = flown ? 0 : strikes_of(flown.error());
     }
-    if (leg || !pilot_.is_at_rest(now)) {
-      failed_legs_ = 0;
-    } else if (is_barred) {
-      ++failed_legs_;
-    }
+    strikes_ = leg || !pilot_.is_at_rest(now) ? 0 : strikes_ + strikes;
   }
   if (in_danger && !leg) {
     const Result<TrajectoryPtr, PlanError> braked = pilot_.brake(now);
@@ -300,7 +298,7 @@ TrajectoryPtr Mission::descend(Time now) {
   const double resolution_m = explorer_config_.map.resolution_m;
   const double lowest_m = pilot_.clearance().geometry().box_m().min().z() + plan.vehicle_radius_m +
                           plan.margin_m + resolution_m;
-  if (here.z() < lowest_m + kArrivedM || failed_legs_ >= kMaxFailedLegs) {
+  if (here.z() < lowest_m + kArrivedM || strikes_ >= kMaxStrikes) {
     state_ = MissionState::kLand;
     return nullptr;
   }

@@ -138,7 +138,7 @@ class Mission {
   std::optional<Time> nothing_left_since_;
   int resumptions_ = 0;
   Time last_leg_{};
-  int failed_legs_ = 0;
+  int strikes_ = 0;
 };
 
 }  // namespace understory

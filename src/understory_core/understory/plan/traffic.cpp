@@ -34,15 +34,20 @@ std::optional<Time> first_meeting(const Trajectory& flown,
 
 bool Traffic::blocks(const Trajectory& planned) const {
   return std::any_of(movers_.begin(), movers_.end(), [&](const Mover& mover) {
-    return first_meeting(planned, planned.start, mover, distances_.plan_m).has_value();
+    const double distance_m =
+        mover.is_at_rest(planned.start) ? distances_.rest_m : distances_.plan_m;
+    return first_meeting(planned, planned.start, mover, distance_m).has_value();
   });
 }
 
 std::optional<Time> Traffic::must_give_way_at(const Trajectory& flown, Time now) const {
   std::optional<Time> first;
   for (const Mover& mover : movers_) {
+    const double distance_m = mover.is_at_rest(now)
+                                  ? std::min(distances_.rest_m, distances_.recheck_m) - kJitterM
+                                  : distances_.recheck_m;
     const std::optional<Time> meeting =
-        first_meeting(flown, std::max(now, flown.start), mover, distances_.recheck_m);
+        first_meeting(flown, std::max(now, flown.start), mover, distance_m);
     const bool is_ours =
         meeting && (mover.has_way || mover.is_at_rest(*meeting) || *meeting - now < kLastMoment);
     if (is_ours && (!first || *meeting < *first)) {
@@ -55,7 +60,7 @@ std::optional<Time> Traffic::must_give_way_at(const Trajectory& flown, Time now)
 bool Traffic::is_occupied(const Vector3d& position_m, Time now) const {
   return std::any_of(movers_.begin(), movers_.end(), [&](const Mover& mover) {
     return mover.is_at_rest(now) &&
-           (mover.position_at(now) - position_m).norm() < distances_.plan_m + mover.extra_m;
+           (mover.position_at(now) - position_m).norm() < distances_.rest_m + mover.extra_m;
   });
 }
 

@@ -29,6 +29,7 @@ struct Mover {
 struct TrafficDistances {
   double plan_m = 1.6;     // kept by what is planned
   double recheck_m = 1.2;  // what is flown gives way below this
+  double rest_m = 0.9;     // kept from who stands still: it comes no nearer by itself
 };
 
 class Traffic {

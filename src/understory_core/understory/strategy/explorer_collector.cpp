@@ -111,6 +111,11 @@ double ExplorerCollector::collector_cost(const StrategyInput& input,
          shared_cost(input, candidate, FlightMode::kCollector);
 }
 
+// Of the part of the box where another vehicle began.
+bool ExplorerCollector::is_foreign(const Candidate& candidate) const {
+  return !rates_.box_m.contains(candidate.cluster->mean_m);
+}
+
 double ExplorerCollector::shared_cost(const StrategyInput& input,
                                       const Candidate& candidate,
                                       FlightMode mode) const {
@@ -194,11 +199,28 @@ Candidate ExplorerCollector::far_view_of(const StrategyInput& input,
   return *far;
 }
 
+std::optional<Candidate> ExplorerCollector::choose_among(const StrategyInput& input,
+                                                         FlightMode mode) const {
+  const bool is_greedy = mode == FlightMode::kCollector && !config_.mode.only_sets_pace;
+  return is_greedy ? choose_as_collector(input) : choose_as_explorer(input);
+}
+
 std::optional<Target> ExplorerCollector::choose(const StrategyInput& input) {
   const FlightMode mode = select_mode(input);
-  const bool is_greedy = mode == FlightMode::kCollector && !config_.mode.only_sets_pace;
-  const std::optional<Candidate> candidate =
-      is_greedy ? choose_as_collector(input) : choose_as_explorer(input);
+  std::optional<Candidate> candidate = choose_among(input, mode);
+  if (candidate && is_foreign(*candidate)) {
+    if (!input.is_complete) {
+      return std::nullopt;  // there may be more of its own further away
+    }
+    StrategyInput own = input;
+    own.candidates.erase(std::remove_if(own.candidates.begin(),
+                                        own.candidates.end(),
+                                        [this](const Candidate& c) { return is_foreign(c); }),
+                         own.candidates.end());
+    const std::optional<Candidate> of_own = choose_among(own, mode);
+    const double worth_m = candidate->route_length_m + rates_.team.foreign_cost_m;
+    candidate = of_own && of_own->route_length_m <= worth_m ? of_own : candidate;
+  }
   if (!candidate) {
     return std::nullopt;
   }

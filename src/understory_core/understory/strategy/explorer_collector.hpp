@@ -151,6 +151,7 @@ class ExplorerCollector final : public Strategy {
 
  private:
   [[nodiscard]] bool is_near_trail(const StrategyInput& input, const Candidate& candidate) const;
+  [[nodiscard]] bool is_foreign(const Candidate& candidate) const;
   [[nodiscard]] double shared_cost(const StrategyInput& input,
                                    const Candidate& candidate,
                                    FlightMode mode) const;
@@ -160,6 +161,8 @@ class ExplorerCollector final : public Strategy {
                                        const Vector3d& position_m) const;
   [[nodiscard]] double turn_angle(const StrategyInput& input, const Vector3d& position_m) const;
   [[nodiscard]] Candidate far_view_of(const StrategyInput& input, const Candidate& cheapest) const;
+  [[nodiscard]] std::optional<Candidate> choose_among(const StrategyInput& input,
+                                                      FlightMode mode) const;
   [[nodiscard]] std::optional<Candidate> choose_as_explorer(const StrategyInput& input) const;
   [[nodiscard]] std::optional<Candidate> choose_as_collector(const StrategyInput& input) const;
 

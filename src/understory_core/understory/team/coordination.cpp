@@ -8,6 +8,7 @@ namespace understory::team {
 namespace {
 
 constexpr double kLeastDistanceM = 0.1;  // 1/d has no value at 0
+constexpr double kRestMarginM = 0.1;     // over the safety distance, to who stands
 constexpr double kEdge = 0.8;            // of the range: from here on a vehicle is held back
 
 // The part of `box` for `index` of `count`, counted from its low end.
@@ -93,7 +94,8 @@ Traffic traffic_of(const TeamConfig& config, const Peers& peers, Time now) {
   }
   return {std::move(movers),
           {separation.plan_distance_m,
-           0.5 * (separation.plan_distance_m + separation.safety_distance_m)}};
+           0.5 * (separation.plan_distance_m + separation.safety_distance_m),
+           separation.safety_distance_m + kRestMarginM}};
 }
 
 }  // namespace understory::team

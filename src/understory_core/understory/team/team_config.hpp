@@ -50,6 +50,7 @@ struct CoordinationConfig {
   double inner_radius_m = 2.0;
   double outer_radius_m = 5.0;
   bool own_region = true;
+  double foreign_cost_m = 30.0;
   bool split_map = false;
   double claim_weight = 0.0;
 
@@ -69,6 +70,12 @@ struct CoordinationConfig {
     f.field("own_region",
             own_region,
             "the box is divided among the vehicles, and each begins in its part; not in the paper");
+    f.field(
+        "foreign_cost_m",
+        foreign_cost_m,
+        in_range(0.0, 1e4),
+        "its own part is finished first, unless what is left of it is so much further away; not "
+        "in the paper");
     f.field("split_map", split_map, "and never leaves it, as with a map split beforehand");
     f.field("claim_weight",
             claim_weight,
