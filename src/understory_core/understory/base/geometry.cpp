@@ -7,6 +7,10 @@
 namespace understory {
 
 double wrap_angle(double angle_rad) {
+  // What std::remainder, which is slow, would return too.
+  if (std::abs(angle_rad) < kPi) {
+    return angle_rad;
+  }
   const double wrapped = std::remainder(angle_rad, 2.0 * kPi);
   return wrapped <= -kPi ? wrapped + 2.0 * kPi : wrapped;
 }

@@ -25,13 +25,17 @@ struct VoxelBox {
   VoxelIndex end = VoxelIndex::Zero();
 
   [[nodiscard]] bool contains(const VoxelIndex& voxel) const {
-    return (voxel.array() >= min.array()).all() && (voxel.array() < end.array()).all();
+    return is_between(voxel.x(), min.x(), end.x()) && is_between(voxel.y(), min.y(), end.y()) &&
+           is_between(voxel.z(), min.z(), end.z());
   }
   [[nodiscard]] bool empty() const { return (min.array() >= end.array()).any(); }
   [[nodiscard]] Vector3i size() const { return end - min; }
   [[nodiscard]] VoxelBox clipped_to(const VoxelBox& other) const {
     return {min.cwiseMax(other.min), end.cwiseMin(other.end)};
   }
+
+ private:
+  [[nodiscard]] static bool is_between(int i, int begin, int end) { return begin <= i && i < end; }
 };
 
 using TileSlot = std::size_t;  // index into a dense table over the box

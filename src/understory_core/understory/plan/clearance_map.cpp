@@ -180,12 +180,9 @@ void ClearanceMap::mark_stale(TileSlot slot, const VoxelBox& changed_in_tile) {
   }
 }
 
-const ClearanceMap::DistanceTile& ClearanceMap::tile_of(TileSlot slot) const {
-  DistanceTilePtr& tile = tiles_[slot];
-  if (tile == nullptr) {
-    tile = computed_tile(slot);
-  }
-  return *tile;
+const ClearanceMap::DistanceTile& ClearanceMap::fresh_tile(TileSlot slot) const {
+  tiles_[slot] = computed_tile(slot);
+  return *tiles_[slot];
 }
 
 ClearanceMap::DistanceTilePtr ClearanceMap::computed_tile(TileSlot slot) const {
@@ -200,13 +197,6 @@ ClearanceMap::DistanceTilePtr ClearanceMap::computed_tile(TileSlot slot) const {
     return open_tile_;
   }
   return std::make_shared<const DistanceTile>(squared_distances(block));
-}
-
-int ClearanceMap::squared_distance_voxels(const VoxelIndex& voxel) const {
-  if (!geometry().contains(voxel)) {
-    return 0;
-  }
-  return tile_of(geometry().slot_of(voxel))[offset_in_tile(voxel)];
 }
 
 ClearanceMap::Cell ClearanceMap::cell_at(const Vector3d& point_m) const {

@@ -38,7 +38,12 @@ class ClearanceMap {
 
   // Between voxel centres, in squared voxels, saturating at kReachVoxels^2; 0: the voxel itself is
   // not free (or outside the box).
-  [[nodiscard]] int squared_distance_voxels(const VoxelIndex& voxel) const;
+  [[nodiscard]] int squared_distance_voxels(const VoxelIndex& voxel) const {
+    if (!geometry().contains(voxel)) {
+      return 0;
+    }
+    return tile_of(geometry().slot_of(voxel))[offset_in_tile(voxel)];
+  }
 
   // Trilinear between voxel centres, half a voxel taken off so that it approximates the distance to
   // the nearest non-free voxel's face. For costs; decisions on safety use clearance_at_least.
@@ -64,7 +69,11 @@ class ClearanceMap {
   };
 
   void mark_stale(TileSlot slot, const VoxelBox& changed_in_tile);
-  [[nodiscard]] const DistanceTile& tile_of(TileSlot slot) const;
+  [[nodiscard]] const DistanceTile& tile_of(TileSlot slot) const {
+    const DistanceTile* tile = tiles_[slot].get();
+    return tile != nullptr ? *tile : fresh_tile(slot);
+  }
+  const DistanceTile& fresh_tile(TileSlot slot) const;
   [[nodiscard]] DistanceTilePtr computed_tile(TileSlot slot) const;
   [[nodiscard]] Cell cell_at(const Vector3d& point_m) const;
   [[nodiscard]] bool ball_is_free(const Vector3d& point_m, double radius_m) const;

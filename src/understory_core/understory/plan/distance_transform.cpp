@@ -68,6 +68,11 @@ void lower_envelope(const std::uint8_t* in, std::size_t stride, std::uint8_t* __
   }
 }
 
+// Is nothing free in a plane of rows?
+bool is_blocked(const std::uint32_t* rows) {
+  return std::all_of(rows, rows + kBlock, [](std::uint32_t row) { return row == 0; });
+}
+
 }  // namespace
 
 std::array<std::uint8_t, kVoxelsPerTile> squared_distances(const FreeBlock& block) {
@@ -76,6 +81,10 @@ std::array<std::uint8_t, kVoxelsPerTile> squared_distances(const FreeBlock& bloc
   // NOLINTNEXTLINE(cppcoreguidelines-pro-type-member-init): written in full before it is read
   std::array<std::uint8_t, kBlock * kPlane> xy;  // z from -8 to 23
   for (std::size_t z = 1; z < kBlock; ++z) {
+    if (is_blocked(&block[z * kBlock])) {  // above and below the box, many are
+      std::memset(&xy[z * kPlane], 0, kPlane);
+      continue;
+    }
     for (std::size_t y = 1; y < kBlock; ++y) {
       distances_along_x(block[z * kBlock + y], &plane[y * kRow]);
     }
@@ -84,6 +93,10 @@ std::array<std::uint8_t, kVoxelsPerTile> squared_distances(const FreeBlock& bloc
   // NOLINTNEXTLINE(cppcoreguidelines-pro-type-member-init): written in full before it is read
   std::array<std::uint8_t, kVoxelsPerTile> out;
   for (std::size_t z = 0; z < kRow; ++z) {
+    if (is_blocked(&block[(z + kHalo) * kBlock])) {
+      std::memset(&out[z * kPlane], 0, kPlane);
+      continue;
+    }
     lower_envelope(&xy[(z + kHalo) * kPlane], kPlane, &out[z * kPlane]);
   }
   return out;

@@ -3,9 +3,26 @@
 #include "understory/plan/line_of_sight.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 namespace understory {
+namespace {
+
+using Steps = std::array<double, ClearanceMap::kReachVoxels * ClearanceMap::kReachVoxels + 1>;
+
+// In voxels, by the squared distance: nothing blocks nearer than the distance to the nearest centre
+// less a voxel's diagonal.
+Steps safe_steps() noexcept {
+  Steps steps{};
+  for (std::size_t squared = 0; squared < steps.size(); ++squared) {
+    steps[squared] = std::max(std::sqrt(static_cast<double>(squared)) - 1.75, 0.9);
+  }
+  return steps;
+}
+const Steps kSafeSteps = safe_steps();
+
+}  // namespace
 
 bool line_is_free(const ClearanceMap& map, const Vector3d& from_m, const Vector3d& to_m) {
   const GridGeometry& geometry = map.geometry();
@@ -19,9 +36,7 @@ bool line_is_free(const ClearanceMap& map, const Vector3d& from_m, const Vector3
     if (squared == 0) {
       return false;
     }
-    // Nothing blocks nearer than the distance to the nearest centre less a voxel's diagonal.
-    const double safe_voxels = std::sqrt(static_cast<double>(squared)) - 1.75;
-    travelled_m += step_m * std::max(safe_voxels, 0.9);
+    travelled_m += step_m * kSafeSteps[static_cast<std::size_t>(squared)];
   }
   return map.squared_distance_voxels(geometry.index_of(to_m)) > 0;
 }
