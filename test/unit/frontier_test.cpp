@@ -172,6 +172,36 @@ TEST(FrontierFinder, ViewpointsAreClearAndSeeTheirCluster) {
   }
 }
 
+TEST(FrontierFinder, FewViewpointsKeptAreTheBestOfMany) {
+  Rng rng(3);
+  test::RandomForest forest;
+  SnapshotBuilder builder = random_forest(forest, rng);
+  builder.set_box({Vector3d(-1.0, -1.0, 0.0), Vector3d(1.5, 1.0, 2.0)}, VoxelState::kUnknown);
+  FrontierConfig many;
+  many.viewpoints.max_kept = 100;
+  FrontierConfig few = many;
+  few.viewpoints.max_kept = 4;
+
+  Bench all(builder, many);
+  Bench best(builder, few);
+  const std::vector<ClusterPtr>& from_all = all.update(builder);
+  const std::vector<ClusterPtr>& from_best = best.update(builder);
+
+  ASSERT_EQ(from_best.size(), from_all.size());
+  std::size_t compared = 0;
+  for (std::size_t i = 0; i < from_all.size(); ++i) {
+    const std::vector<Viewpoint>& expected = from_all[i]->viewpoints;
+    const std::vector<Viewpoint>& kept = from_best[i]->viewpoints;
+    ASSERT_EQ(kept.size(), std::min<std::size_t>(expected.size(), 4));
+    for (std::size_t rank = 0; rank < kept.size(); ++rank) {
+      EXPECT_EQ(kept[rank].node, expected[rank].node);
+      EXPECT_EQ(kept[rank].coverage, expected[rank].coverage);
+      ++compared;
+    }
+  }
+  EXPECT_GT(compared, 8U);
+}
+
 TEST(FrontierFinder, ClusterWithoutViewpointIsDormantAndWakesWhenTheMapNearItChanges) {
   SnapshotBuilder builder(0.10, kBox);
   builder.fill(VoxelState::kOccupied)

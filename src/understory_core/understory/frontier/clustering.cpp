@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <limits>
 
 namespace understory {
@@ -26,6 +27,21 @@ Vector2d principal_axis(const std::vector<VoxelIndex>& voxels, const Vector2d& m
   }
   const double angle = 0.5 * std::atan2(2.0 * xy, xx - yy);
   return {std::cos(angle), std::sin(angle)};
+}
+
+// Those whose centres lie no further than this from the box on any axis.
+std::vector<VoxelIndex> voxels_near(const std::vector<VoxelIndex>& voxels,
+                                    Box3d bounds_m,
+                                    double distance_m,
+                                    const GridGeometry& geometry) {
+  bounds_m.min().array() -= distance_m;
+  bounds_m.max().array() += distance_m;
+  std::vector<VoxelIndex> near;
+  std::copy_if(
+      voxels.begin(), voxels.end(), std::back_inserter(near), [&](const VoxelIndex& voxel) {
+        return bounds_m.contains(geometry.center_of(voxel));
+      });
+  return near;
 }
 
 }  // namespace
@@ -86,20 +102,14 @@ bool are_neighbours(const Cluster& a,
   }
   const double reach = distance_m / geometry.resolution_m();
   const auto squared_reach = static_cast<int>(reach * reach + 1e-6);
-  Box3d near_b = b.bounds_m;
-  near_b.min().array() -= distance_m;
-  near_b.max().array() += distance_m;
-  for (const VoxelIndex& voxel : a.voxels) {
-    if (!near_b.contains(geometry.center_of(voxel))) {
-      continue;
-    }
-    for (const VoxelIndex& other : b.voxels) {
-      if ((voxel - other).squaredNorm() <= squared_reach) {
-        return true;
-      }
-    }
-  }
-  return false;
+  const std::vector<VoxelIndex> near_b = voxels_near(a.voxels, b.bounds_m, distance_m, geometry);
+  const std::vector<VoxelIndex> near_a =
+      voxels_near(b.voxels, a.bounds_m, distance_m + geometry.resolution_m(), geometry);
+  return std::any_of(near_b.begin(), near_b.end(), [&](const VoxelIndex& voxel) {
+    return std::any_of(near_a.begin(), near_a.end(), [&](const VoxelIndex& other) {
+      return (voxel - other).squaredNorm() <= squared_reach;
+    });
+  });
 }
 
 std::vector<Vector2d> convex_hull(std::vector<Vector2d> points) {

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <bitset>
 #include <iterator>
-#include <set>
 
 #include "understory/frontier/clustering.hpp"
 #include "understory/frontier/trail_label.hpp"
@@ -15,19 +14,6 @@ namespace {
 
 constexpr std::uint32_t kNoOwner = 0;
 constexpr std::uint32_t kPooled = 1;
-
-template <class Visit>
-void for_each_of_26_neighbours(const VoxelIndex& voxel, const Visit& visit) {
-  for (int dz = -1; dz <= 1; ++dz) {
-    for (int dy = -1; dy <= 1; ++dy) {
-      for (int dx = -1; dx <= 1; ++dx) {
-        if (dx != 0 || dy != 0 || dz != 0) {
-          visit(VoxelIndex(voxel.x() + dx, voxel.y() + dy, voxel.z() + dz));
-        }
-      }
-    }
-  }
-}
 
 }  // namespace
 
@@ -57,12 +43,44 @@ void FrontierFinder::set_owner(const VoxelIndex& voxel, std::uint32_t owner) {
   (*owners)[offset_in_tile(voxel)] = owner;
 }
 
+// The 26 neighbours that have an owner, row by row.
+template <class Visit>
+void FrontierFinder::for_each_owned_neighbour(const VoxelIndex& voxel, const Visit& visit) const {
+  const VoxelBox& box = geometry_.voxels();
+  const int first = std::max(voxel.x() - 1, box.min.x());
+  const int last = std::min(voxel.x() + 1, box.end.x() - 1);
+  for (int z = std::max(voxel.z() - 1, box.min.z()); z <= std::min(voxel.z() + 1, box.end.z() - 1);
+       ++z) {
+    for (int y = std::max(voxel.y() - 1, box.min.y());
+         y <= std::min(voxel.y() + 1, box.end.y() - 1);
+         ++y) {
+      const Owners* owners = nullptr;
+      for (int x = first; x <= last; ++x) {
+        const VoxelIndex neighbour(x, y, z);
+        if (x == first || (x & (kTileVoxels - 1)) == 0) {
+          owners = owners_[geometry_.slot_of(neighbour)].get();
+        }
+        const std::uint32_t owner =
+            owners == nullptr ? kNoOwner : (*owners)[offset_in_tile(neighbour)];
+        if (owner != kNoOwner && neighbour != voxel) {
+          visit(neighbour, owner);
+        }
+      }
+    }
+  }
+}
+
 // Takes apart every cluster that lost a voxel or that a new voxel touches, and returns the frontier
 // voxels that have no cluster now.
 std::vector<VoxelIndex> FrontierFinder::dissolve() {
-  std::set<std::uint32_t> affected;
+  std::vector<std::uint32_t> affected;
+  const auto affect = [&affected](std::uint32_t owner) {
+    if (owner != kNoOwner && (affected.empty() || affected.back() != owner)) {
+      affected.push_back(owner);
+    }
+  };
   for (const VoxelIndex& voxel : pending_.removed) {
-    affected.insert(owner_of(voxel));
+    affect(owner_of(voxel));
   }
   // What came and went again since the last time is of no account.
   pending_.added.erase(
@@ -71,14 +89,10 @@ std::vector<VoxelIndex> FrontierFinder::dissolve() {
                      [this](const VoxelIndex& voxel) { return !field_.contains(voxel); }),
       pending_.added.end());
   for (const VoxelIndex& voxel : pending_.added) {
-    for_each_of_26_neighbours(voxel, [&](const VoxelIndex& neighbour) {
-      const std::uint32_t owner = owner_of(neighbour);
-      if (owner != kNoOwner) {
-        affected.insert(owner);
-      }
-    });
+    for_each_owned_neighbour(voxel, [&](const VoxelIndex&, auto owner) { affect(owner); });
   }
-  affected.erase(kNoOwner);
+  std::sort(affected.begin(), affected.end());
+  affected.erase(std::unique(affected.begin(), affected.end()), affected.end());
   std::vector<VoxelIndex> pool;
   for (const std::uint32_t id : affected) {
     const auto member = members_.find(id);
@@ -104,8 +118,8 @@ std::vector<VoxelIndex> FrontierFinder::grow_component(const VoxelIndex& seed) {
   set_owner(seed, kNoOwner);
   for (std::size_t next = 0; next < component.size(); ++next) {
     const VoxelIndex voxel = component[next];
-    for_each_of_26_neighbours(voxel, [&](const VoxelIndex& neighbour) {
-      if (owner_of(neighbour) == kPooled) {
+    for_each_owned_neighbour(voxel, [&](const VoxelIndex& neighbour, auto owner) {
+      if (owner == kPooled) {
         set_owner(neighbour, kNoOwner);
         component.push_back(neighbour);
       }
@@ -136,16 +150,16 @@ std::vector<std::uint32_t> FrontierFinder::form_clusters(const std::vector<Voxel
   return formed;
 }
 
-std::size_t FrontierFinder::neighbour_count(const Cluster& cluster) const {
+bool FrontierFinder::has_more_neighbours_than(std::size_t most, const Cluster& cluster) const {
   std::size_t count = 0;
   for (const auto& [id, other] : members_) {
-    if (id != cluster.id &&
-        other->voxels.size() >= static_cast<std::size_t>(config_.min_cluster_voxels) &&
-        are_neighbours(cluster, *other, config_.trails.neighbour_distance_m, geometry_)) {
-      ++count;
+    if (id != cluster.id && is_large(*other) &&
+        are_neighbours(cluster, *other, config_.trails.neighbour_distance_m, geometry_) &&
+        ++count > most) {
+      return true;
     }
   }
-  return count;
+  return false;
 }
 
 bool FrontierFinder::map_changed_within(double distance_m, const Cluster& cluster) const {
@@ -163,6 +177,11 @@ void FrontierFinder::refresh(const ClearanceMap& map,
                              const std::vector<std::uint32_t>& formed) {
   const double reach_m = config_.trails.ring_m + config_.trails.neighbour_distance_m;
   const double view_reach_m = config_.viewpoints.max_radius_m;
+  std::vector<Box3d> formed_m;
+  formed_m.reserve(formed.size());
+  for (const std::uint32_t id : formed) {
+    formed_m.push_back(members_.at(id)->bounds_m);
+  }
   const auto is_formed = [&](std::uint32_t id) {
     return std::binary_search(formed.begin(), formed.end(), id);
   };
@@ -172,9 +191,9 @@ void FrontierFinder::refresh(const ClearanceMap& map,
     }
     const bool is_new = is_formed(id);
     const bool relabel =
-        is_new || std::any_of(formed.begin(), formed.end(), [&, &cluster = *member](auto other) {
-          return members_.at(other)->bounds_m.squaredExteriorDistance(cluster.bounds_m) <=
-                 reach_m * reach_m;
+        is_new ||
+        std::any_of(formed_m.begin(), formed_m.end(), [&, &cluster = *member](auto& other) {
+          return other.squaredExteriorDistance(cluster.bounds_m) <= reach_m * reach_m;
         });
     const bool resample =
         is_new || (member->is_dormant() && map_changed_within(view_reach_m, *member));
@@ -185,7 +204,7 @@ void FrontierFinder::refresh(const ClearanceMap& map,
     if (relabel) {
       const std::size_t lone = config_.trails.one_neighbour_is_trail ? 1 : 0;
       const Surroundings around = surroundings_of(map.snapshot(), cluster, config_.trails);
-      const bool trail = around.is_free_all_around || neighbour_count(cluster) <= lone;
+      const bool trail = around.is_free_all_around || !has_more_neighbours_than(lone, cluster);
       cluster.label = trail ? ClusterLabel::kTrail : ClusterLabel::kFrontier;
       cluster.island_m3 = around.island_m3;
     }

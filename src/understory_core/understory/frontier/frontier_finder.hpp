@@ -50,6 +50,8 @@ class FrontierFinder {
 
   [[nodiscard]] std::uint32_t owner_of(const VoxelIndex& voxel) const;
   void set_owner(const VoxelIndex& voxel, std::uint32_t owner);
+  template <class Visit>
+  void for_each_owned_neighbour(const VoxelIndex& voxel, const Visit& visit) const;
   std::vector<VoxelIndex> dissolve();
   std::vector<std::uint32_t> form_clusters(const std::vector<VoxelIndex>& pool);
   std::vector<VoxelIndex> grow_component(const VoxelIndex& seed);
@@ -57,7 +59,7 @@ class FrontierFinder {
                const RouteSearch& routes,
                const std::vector<std::uint32_t>& formed);
   [[nodiscard]] bool map_changed_within(double distance_m, const Cluster& cluster) const;
-  [[nodiscard]] std::size_t neighbour_count(const Cluster& cluster) const;
+  [[nodiscard]] bool has_more_neighbours_than(std::size_t most, const Cluster& cluster) const;
   void count_known(const MapSnapshot& snapshot, const std::vector<TileSlot>& changed);
   [[nodiscard]] bool is_large(const Cluster& cluster) const {
     return cluster.voxels.size() >= static_cast<std::size_t>(config_.min_cluster_voxels);

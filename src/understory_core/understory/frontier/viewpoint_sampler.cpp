@@ -18,6 +18,30 @@ struct YawChoice {
   std::size_t in_view;
 };
 
+// How many of a cluster's sampled voxels a view has to show to be among those kept: more than the
+// worst of them, as soon as there are that many.
+class Threshold {
+ public:
+  Threshold(std::size_t least, std::size_t most, std::size_t max_kept)
+      : needed_(least), room_(max_kept), kept_(most + 1, 0) {}
+
+  [[nodiscard]] std::size_t needed() const { return needed_; }
+  [[nodiscard]] bool is_full() const { return needed_ >= kept_.size(); }
+  void keep(std::size_t in_view) {
+    ++kept_[in_view];
+    better_ += in_view >= needed_ ? 1U : 0U;
+    while (!is_full() && better_ >= room_) {
+      better_ -= kept_[needed_++];
+    }
+  }
+
+ private:
+  std::size_t needed_;
+  std::size_t room_;
+  std::size_t better_ = 0;         // kept, and at least as good as needed
+  std::vector<std::size_t> kept_;  // by how many they show
+};
+
 // The heading that has the most of these bearings in a window of this half width.
 YawChoice best_yaw(std::vector<double> bearings_rad, double half_width_rad) {
   std::sort(bearings_rad.begin(), bearings_rad.end());
@@ -132,19 +156,24 @@ std::vector<Viewpoint> ViewpointSampler::sample(const ClearanceMap& map,
   for (std::size_t i = 0; i < count; ++i) {
     sampled.push_back(map.geometry().center_of(cluster.voxels[i * cluster.voxels.size() / count]));
   }
-  const auto needed = std::max<std::size_t>(
+  const auto least = std::max<std::size_t>(
       1, static_cast<std::size_t>(std::ceil(config_.min_coverage * static_cast<double>(count))));
+  Threshold threshold(least, count, static_cast<std::size_t>(config_.max_kept));
   std::vector<Viewpoint> viewpoints;
   for (const RouteLattice::Node& node : candidates(map, routes, cluster)) {
+    if (threshold.is_full()) {
+      break;
+    }
     const Vector3d position = routes.lattice().point_of(node);
-    std::vector<double> bearings = bearings_in_view(map, position, sampled, needed);
-    if (bearings.size() < needed) {
+    std::vector<double> bearings = bearings_in_view(map, position, sampled, threshold.needed());
+    if (bearings.size() < threshold.needed()) {
       continue;
     }
     const YawChoice yaw = best_yaw(std::move(bearings), half_horizontal_fov_rad_);
     const double coverage = static_cast<double>(yaw.in_view) / static_cast<double>(count);
     if (coverage >= config_.min_coverage) {
       viewpoints.push_back({node, position, yaw.yaw_rad, coverage});
+      threshold.keep(yaw.in_view);
     }
   }
   std::stable_sort(viewpoints.begin(),
