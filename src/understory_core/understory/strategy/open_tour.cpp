@@ -40,15 +40,15 @@ class Improver {
 
   // Until neither reversing a piece nor moving a short one helps, among the first `end` positions.
   void improve(std::size_t end) {
-    bool is_better = true;
-    while (is_better) {
-      is_better = false;
-      for (std::size_t i = 0; i < end; ++i) {
-        is_better = reverse_from(i, end) || is_better;
-        for (std::size_t length = 1; length <= kLongestMoved && i + length <= end; ++length) {
-          is_better = move_from(i, length, end) || is_better;
-        }
+    std::size_t i = 0;
+    std::size_t tried_in_vain = 0;
+    while (tried_in_vain < end) {
+      bool is_better = reverse_from(i, end);
+      for (std::size_t length = 1; length <= kLongestMoved && i + length <= end; ++length) {
+        is_better = move_from(i, length, end) || is_better;
       }
+      tried_in_vain = is_better ? 0 : tried_in_vain + 1;
+      i = i + 1 < end ? i + 1 : 0;
     }
   }
 
@@ -87,18 +87,53 @@ class Improver {
   }
 
   bool reverse_from(std::size_t i, std::size_t end) {
+    // Costs are alike in both directions.
+    const double* from_before = i == 0 ? costs_.first_row() : costs_.row(tour_[i - 1]);
+    const double* from_head = costs_.row(tour_[i]);
     bool is_better = false;
     for (std::size_t j = i + 1; j < end; ++j) {
       const double before = edge_at(i) + edge_at(j + 1);
-      const double after = edge(i, tour_[j]) + edge_from(tour_[i], j + 1);
+      const double onward = j + 1 < tour_.size() ? from_head[tour_[j + 1]] : 0.0;
+      const double after = from_before[tour_[j]] + onward;
       if (after < before - kLeastGain) {
         std::reverse(tour_.begin() + static_cast<std::ptrdiff_t>(i),
                      tour_.begin() + static_cast<std::ptrdiff_t>(j + 1));
         measure_legs(i, j + 1);
+        from_head = costs_.row(tour_[i]);
         is_better = true;
       }
     }
     return is_better;
+  }
+
+  // Where a piece goes.
+  struct Place {
+    std::size_t at;
+    double cost;
+    bool is_turned;
+  };
+
+  // The one of these positions where a piece, either way round, costs less than at `best`.
+  [[nodiscard]] Place cheapest(
+      std::size_t first, std::size_t last, std::size_t head, std::size_t tail, Place best) const {
+    const double* from_head = costs_.row(head);
+    const double* from_tail = costs_.row(tail);
+    double to_head = edge(first, head);
+    double to_tail = edge(first, tail);
+    for (std::size_t at = first; at <= last; ++at) {
+      const bool is_end = at == tour_.size();
+      const double head_onward = is_end ? 0.0 : from_head[tour_[at]];
+      const double tail_onward = is_end ? 0.0 : from_tail[tour_[at]];
+      const double opened = edge_at(at);
+      const double straight = to_head + tail_onward - opened;
+      const double turned = to_tail + head_onward - opened;
+      if (std::min(straight, turned) < best.cost) {
+        best = {at, std::min(straight, turned), turned < straight};
+      }
+      to_head = head_onward;
+      to_tail = tail_onward;
+    }
+    return best;
   }
 
   // Takes the piece out and puts it, either way round, where it costs least.
@@ -108,22 +143,15 @@ class Improver {
     const std::size_t tail = tour_[next - 1];
     const double closed = next < tour_.size() ? edge(i, tour_[next]) : 0.0;
     const double saved = edge_at(i) + edge_at(next) - closed;
-    double best = saved - kLeastGain;
-    std::size_t best_at = i;
-    bool is_turned = false;
-    for (std::size_t at = 0; at <= end; ++at) {
-      if (at >= i && at <= next) {
-        continue;
-      }
-      const double opened = edge_at(at);
-      const double straight = edge(at, head) + edge_from(tail, at) - opened;
-      const double turned = edge(at, tail) + edge_from(head, at) - opened;
-      if (std::min(straight, turned) < best) {
-        best = std::min(straight, turned);
-        best_at = at;
-        is_turned = turned < straight;
-      }
+    Place best{i, saved - kLeastGain, false};
+    if (i > 0) {
+      best = cheapest(0, i - 1, head, tail, best);
     }
+    if (next < end) {
+      best = cheapest(next + 1, end, head, tail, best);
+    }
+    const std::size_t best_at = best.at;
+    const bool is_turned = best.is_turned;
     if (best_at == i) {
       return false;
     }

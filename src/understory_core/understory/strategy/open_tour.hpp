@@ -26,6 +26,9 @@ class TourCosts {
   [[nodiscard]] double between(std::size_t a, std::size_t b) const {
     return costs_[(a + 1) * places_ + b];
   }
+  // All of those, by place.
+  [[nodiscard]] const double* first_row() const { return costs_.data(); }
+  [[nodiscard]] const double* row(std::size_t a) const { return &costs_[(a + 1) * places_]; }
   void set_first(std::size_t place, double cost) { costs_[place] = cost; }
   void set_between(std::size_t a, std::size_t b, double cost) {
     costs_[(a + 1) * places_ + b] = cost;
