@@ -73,6 +73,41 @@ TEST(RouteSearch, RoutesKeepTheirClearanceInRandomForests) {
   }
 }
 
+// Searched together up to a limit, which leaves out what leads to none of them in time.
+TEST(RouteSearch, LimitChangesNoRouteThatIsShorter) {
+  constexpr double kLimitM = 7.0;
+  std::size_t reached = 0;
+  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+    Rng rng(seed);
+    test::RandomForest forest;
+    SnapshotBuilder builder = random_forest(forest, rng);
+    ClearanceMap map;
+    map.update(builder.build());
+    RouteSearch limited(builder.geometry(), kClearanceM);
+    RouteSearch endless(builder.geometry(), kClearanceM);
+    std::vector<RouteLattice::Node> targets;
+    for (int i = 0; i < 12; ++i) {
+      targets.push_back(limited.lattice().nearest(
+          {rng.uniform(-6.5, 6.5), rng.uniform(-6.5, 6.5), rng.uniform(0.2, 1.8)}));
+    }
+    const Vector3d start(rng.uniform(-6.5, 6.5), rng.uniform(-6.5, 6.5), 1.0);
+
+    limited.run(map, start, targets, kLimitM);
+    endless.run(map, start, targets, kEndlessM);
+
+    for (const RouteLattice::Node& target : targets) {
+      const bool is_near = endless.length_m(target).value_or(kEndlessM) <= kLimitM;
+      reached += is_near ? 1U : 0U;
+      ASSERT_EQ(limited.length_m(target).has_value(), is_near) << "seed " << seed;
+      if (is_near) {
+        EXPECT_EQ(*limited.length_m(target), *endless.length_m(target)) << "seed " << seed;
+        EXPECT_EQ(limited.route_m(target), endless.route_m(target)) << "seed " << seed;
+      }
+    }
+  }
+  EXPECT_GT(reached, 50U);
+}
+
 TEST(RouteSearch, LengthIsAtMostEightPercentAboveTheStraightLineInTheOpen) {
   SnapshotBuilder builder(0.10, kBox);
   ClearanceMap map;

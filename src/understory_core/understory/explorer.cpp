@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <limits>
+#include <numeric>
 
 namespace understory {
 namespace {
@@ -143,6 +144,11 @@ StrategyInput Explorer::gather(const Pilot& pilot, Time now, Reach reach) {
   input.mode = mode_;
   input.target = target_ ? target_->candidate.cluster : nullptr;
   input.peers = peers_;
+  input.candidates.reserve(std::accumulate(
+      finder_.clusters().begin(),
+      finder_.clusters().end(),
+      std::size_t{0},
+      [](std::size_t sum, const ClusterPtr& each) { return sum + each->viewpoints.size(); }));
   for (const ClusterPtr& cluster : finder_.clusters()) {
     if (!is_ours(*cluster) ||
         (reach < Reach::kAllAndSetAside && set_aside_.is_waiting(*cluster, now))) {
@@ -206,8 +212,12 @@ void Explorer::estimate(const ClearanceMap& map, StrategyInput& input) {
 
 bool Explorer::has_route(RouteSearch& routes, const StrategyInput& input, const Target& target) {
   const RouteLattice::Node& node = target.candidate.viewpoint.node;
-  if (!routes.length_m(node)) {
-    routes.run(*input.map, input.vehicle.position_m, {node}, kUnreachable);
+  // What is estimated is found with little work mostly.
+  const double likely_m = 1.15 * target.candidate.route_length_m + 1.0;
+  for (const double max_length_m : {likely_m, kUnreachable}) {
+    if (!routes.length_m(node)) {
+      routes.run(*input.map, input.vehicle.position_m, {node}, max_length_m);
+    }
   }
   return routes.length_m(node).has_value();
 }

@@ -24,9 +24,12 @@ RouteLattice::Node CoarseRoutes::entry_of(const ClearanceMap& map, const Vector3
   const RouteLattice& lattice = routes_.lattice();
   RouteLattice::Node center = lattice.nearest(at_m);
   center.z() = 0;
-  RouteLattice::Node best(-1, -1, -1);
+  if (routes_.passable(map, center)) {
+    return center;
+  }
+  RouteLattice::Node best = nowhere();
   double nearest = std::numeric_limits<double>::infinity();
-  for (int shell = 0; shell <= kEntryReachNodes && best.x() < 0; ++shell) {
+  for (int shell = 1; shell <= kEntryReachNodes && best.x() < 0; ++shell) {
     for (int dy = -shell; dy <= shell; ++dy) {
       for (int dx = -shell; dx <= shell; ++dx) {
         const RouteLattice::Node node = center + Vector3i(dx, dy, 0);

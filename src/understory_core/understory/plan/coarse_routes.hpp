@@ -20,6 +20,8 @@ class CoarseRoutes {
 
   CoarseRoutes(const GridGeometry& geometry, double clearance_m);
 
+  // Outside of the lattice: no way leads there.
+  [[nodiscard]] static RouteLattice::Node nowhere() { return {-1, -1, -1}; }
   [[nodiscard]] RouteLattice::Node entry_of(const ClearanceMap& map, const Vector3d& at_m) const;
   // Nothing: no way was found, or none up to `max_length_m`. At least the straight line is up to
   // the caller.

@@ -6,6 +6,8 @@
 #include <array>
 #include <cmath>
 
+#include "understory/plan/route_budget.hpp"
+
 namespace understory {
 namespace {
 
@@ -14,6 +16,7 @@ constexpr std::uint32_t kStraightCost = 5;
 constexpr std::uint32_t kDiagonalCost = 7;
 constexpr std::uint32_t kLayerCost = 10;
 constexpr std::size_t kBuckets = 64;  // above any single cost that is offered
+constexpr std::uint32_t kUnlimited = UINT32_MAX / 2;
 constexpr int kEntryReachNodes = 4;
 constexpr int kEntryReachLayers = 2;
 
@@ -91,21 +94,51 @@ void RouteSearch::enter_lattice(const ClearanceMap& map) {
   }
 }
 
+// Marks the targets that a route of this cost can lead to at best, and returns them.
+std::vector<RouteLattice::Node> RouteSearch::mark_targets(
+    const std::vector<RouteLattice::Node>& targets, double max_cost) {
+  // Diagonals are a hundredth shorter than they should be; the way into the lattice is rounded.
+  constexpr double kShortest = 0.98;
+  constexpr double kRounding = 1.0;
+  std::vector<RouteLattice::Node> marked;
+  for (const RouteLattice::Node& target : targets) {
+    if (!lattice_.contains(target)) {
+      continue;
+    }
+    const double straight_m = (lattice_.point_of(target) - start_m_).head<2>().norm();
+    if (kShortest * straight_m / cost_unit_m_ > max_cost + kRounding) {
+      continue;
+    }
+    NodeState& state = state_in_this_run(lattice_.index_of(target));
+    if (!state.is_target) {
+      state.is_target = true;
+      marked.push_back(target);
+    }
+  }
+  return marked;
+}
+
 void RouteSearch::relax(const ClearanceMap& map,
                         const RouteLattice::Node& node,
                         std::size_t from,
                         const Step& step) {
-  const RouteLattice::Node next = node + step.offset;
+  const RouteLattice::Node next(node.x() + step.dx, node.y() + step.dy, node.z() + step.dz);
   if (!lattice_.contains(next)) {
     return;
   }
   const std::size_t index = lattice_.index_of(next);
   const std::uint32_t cost = nodes_[from].cost + step.cost;
-  NodeState& state = state_in_this_run(index);
-  if (state.is_settled || cost >= state.cost || !passable(map, next)) {
+  NodeState& state = nodes_[index];
+  // Of settled nodes and impassable ones too.
+  if (state.run == run_ && cost >= state.cost) {
     return;
   }
-  const VoxelIndex midway = (lattice_.voxel_of(node) + lattice_.voxel_of(next)) / 2;
+  const VoxelIndex voxel = lattice_.voxel_of(next);
+  if (map.squared_distance_voxels(voxel) < min_squared_distance_) {
+    state_in_this_run(index).cost = 0;
+    return;
+  }
+  const VoxelIndex midway = (lattice_.voxel_of(node) + voxel) / 2;
   if (map.squared_distance_voxels(midway) >= min_edge_squared_distance_) {
     offer(index, cost, static_cast<std::int32_t>(from));
   }
@@ -115,33 +148,31 @@ void RouteSearch::run(const ClearanceMap& map,
                       const Vector3d& start_m,
                       const std::vector<RouteLattice::Node>& targets,
                       double max_length_m) {
-  static constexpr std::array<std::array<int, 4>, 10> kSteps{{{1, 0, 0, kStraightCost},
-                                                              {-1, 0, 0, kStraightCost},
-                                                              {0, 1, 0, kStraightCost},
-                                                              {0, -1, 0, kStraightCost},
-                                                              {1, 1, 0, kDiagonalCost},
-                                                              {1, -1, 0, kDiagonalCost},
-                                                              {-1, 1, 0, kDiagonalCost},
-                                                              {-1, -1, 0, kDiagonalCost},
-                                                              {0, 0, 1, kLayerCost},
-                                                              {0, 0, -1, kLayerCost}}};
+  static constexpr std::array<Step, 10> kSteps{{{1, 0, 0, kStraightCost},
+                                                {-1, 0, 0, kStraightCost},
+                                                {0, 1, 0, kStraightCost},
+                                                {0, -1, 0, kStraightCost},
+                                                {1, 1, 0, kDiagonalCost},
+                                                {1, -1, 0, kDiagonalCost},
+                                                {-1, 1, 0, kDiagonalCost},
+                                                {-1, -1, 0, kDiagonalCost},
+                                                {0, 0, 1, kLayerCost},
+                                                {0, 0, -1, kLayerCost}}};
   ++run_;
   start_m_ = start_m;
   for (std::vector<std::uint32_t>& bucket : buckets_) {
     bucket.clear();
   }
-  std::size_t open_targets = 0;
-  for (const RouteLattice::Node& target : targets) {
-    if (lattice_.contains(target)) {
-      NodeState& state = state_in_this_run(lattice_.index_of(target));
-      open_targets += state.is_target ? 0U : 1U;
-      state.is_target = true;
-    }
+  const std::vector<RouteLattice::Node> marked = mark_targets(targets, max_length_m / cost_unit_m_);
+  const auto max_cost = static_cast<std::uint32_t>(
+      std::clamp(max_length_m / cost_unit_m_, 0.0, static_cast<double>(kUnlimited)));
+  std::optional<RouteBudget> budget;
+  if (max_cost < kUnlimited && !marked.empty()) {
+    budget.emplace(
+        lattice_, marked, max_cost, RouteBudget::StepCosts{kStraightCost, kDiagonalCost});
   }
   enter_lattice(map);
-
-  const auto max_cost = static_cast<std::uint32_t>(
-      std::clamp(max_length_m / cost_unit_m_, 0.0, static_cast<double>(UINT32_MAX / 2)));
+  std::size_t open_targets = marked.size();
   std::size_t empty_in_a_row = 0;
   for (std::uint32_t cost = 0; cost <= max_cost && empty_in_a_row < kBuckets && open_targets > 0;
        ++cost) {
@@ -154,11 +185,14 @@ void RouteSearch::run(const ClearanceMap& map,
       if (state.is_settled || state.cost != cost) {
         continue;
       }
+      const RouteLattice::Node node = lattice_.node_of_index(index);
+      if (budget && !budget->allows(node, cost)) {
+        continue;
+      }
       state.is_settled = true;
       open_targets -= state.is_target ? 1U : 0U;
-      const RouteLattice::Node node = lattice_.node_of_index(index);
-      for (const auto& step : kSteps) {
-        relax(map, node, index, {{step[0], step[1], step[2]}, static_cast<std::uint32_t>(step[3])});
+      for (const Step& step : kSteps) {
+        relax(map, node, index, step);
       }
     }
   }

@@ -5,7 +5,9 @@
 // price of one search (the paper runs A* per target; same numbers, less work). World frame,
 // metres. Edges: the 8 neighbours in a layer and the layers above and below; a node is passable
 // when the ball of `clearance_m` around it is known free. Lengths are those of the lattice, up to
-// 8 % above the straight line. Deterministic, one thread; scratch memory is kept between calls.
+// 8 % above the straight line. Nodes that no route of the length asked for can lead through are
+// left out, which changes neither lengths nor routes. Deterministic, one thread; scratch memory is
+// kept between calls.
 #pragma once
 
 #include <cstdint>
@@ -33,7 +35,8 @@ class RouteSearch {
            const std::vector<RouteLattice::Node>& targets,
            double max_length_m);
 
-  // Of the last run; nothing when the node was not reached.
+  // Of a target of the last run; nothing when it was not reached. Of other nodes, only what was
+  // needed for that is known.
   [[nodiscard]] std::optional<double> length_m(const RouteLattice::Node& node) const;
   // From the start's position to the node, lattice point by lattice point.
   [[nodiscard]] std::vector<Vector3d> route_m(const RouteLattice::Node& node) const;
@@ -46,17 +49,21 @@ class RouteSearch {
 
  private:
   struct NodeState {
-    std::uint32_t run = 0;  // the run in which the rest was written
-    std::uint32_t cost = 0;
+    std::uint32_t run = 0;   // the run in which the rest was written
+    std::uint32_t cost = 0;  // of an impassable node: none is less
     std::int32_t parent = -1;
     bool is_settled = false;
     bool is_target = false;
   };
   struct Step {
-    Vector3i offset;
+    int dx;
+    int dy;
+    int dz;
     std::uint32_t cost;
   };
 
+  std::vector<RouteLattice::Node> mark_targets(const std::vector<RouteLattice::Node>& targets,
+                                               double max_cost);
   void enter_lattice(const ClearanceMap& map);
   void relax(const ClearanceMap& map,
              const RouteLattice::Node& node,

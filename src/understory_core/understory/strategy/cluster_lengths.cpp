@@ -9,6 +9,7 @@ namespace {
 
 // Of what comes next the order matters; the work grows with the square of this.
 constexpr double kLongestSearchedM = 15.0;
+constexpr double kSurelyFarM = 1.2 * kLongestSearchedM;
 constexpr double kDetourFactor = 1.2;  // of ways that were not found, on the straight line
 
 const Vector3d& view_of(const Cluster& cluster) {
@@ -58,10 +59,18 @@ void ClusterLengths::update(const ClearanceMap& map, const std::vector<const Clu
   if (fresh.empty()) {
     return;
   }
+  // The others are too far from all that is new, wherever near the views the lattice is entered.
+  const auto is_near = [&](const Cluster& cluster) {
+    return std::any_of(fresh.begin(), fresh.end(), [&](std::size_t place) {
+      const Vector3d way_m = view_of(cluster) - view_of(*clusters[place]);
+      return way_m.head<2>().squaredNorm() < kSurelyFarM * kSurelyFarM;
+    });
+  };
   CoarseRoutes::Entries entries;
   entries.reserve(clusters.size());
   for (const Cluster* cluster : clusters) {
-    entries.push_back(routes_.entry_of(map, view_of(*cluster)));
+    entries.push_back(is_near(*cluster) ? routes_.entry_of(map, view_of(*cluster))
+                                        : CoarseRoutes::nowhere());
   }
   for (const std::size_t from : fresh) {
     const Vector3d& from_m = view_of(*clusters[from]);
