@@ -50,7 +50,7 @@ struct CoordinationConfig {
   double inner_radius_m = 2.0;
   double outer_radius_m = 5.0;
   bool own_region = true;
-  double foreign_cost_m = 30.0;
+  double foreign_cost_m = 100.0;
   bool split_map = false;
   double claim_weight = 0.0;
 
