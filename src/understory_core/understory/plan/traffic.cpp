@@ -12,18 +12,40 @@ constexpr Duration kStep = std::chrono::milliseconds(50);
 constexpr Duration kLastMoment = std::chrono::milliseconds(2500);
 constexpr double kJitterM = 0.02;
 
-// The first instant of `flown` from `from` on at which it is nearer to `mover` than `distance_m`.
-std::optional<Time> first_meeting(const Trajectory& flown,
-                                  Time from,
-                                  const Mover& mover,
-                                  double distance_m) {
-  const Time end = std::max(flown.end(), mover.trajectory ? mover.trajectory->end() : from);
-  const auto distance_at = [&](Time time) {
-    return (flown.sample(time).position_m - mover.position_at(time)).norm();
-  };
-  const double least_m = std::min(distance_m + mover.extra_m, distance_at(from) - kJitterM);
-  for (Time time = from; time <= end + kStep; time += kStep) {
-    if (distance_at(time) < least_m) {
+// Where who flies this is from `from` on, step by step, until it rests.
+struct Path {
+  Path(const Trajectory& flown, Time begin) : from(begin) {
+    for (Time time = from; time <= flown.end() + kStep; time += kStep) {
+      positions_m.push_back(flown.sample(time).position_m);
+    }
+    if (positions_m.empty()) {
+      positions_m.push_back(flown.sample(from).position_m);
+    }
+  }
+
+  [[nodiscard]] const Vector3d& at(std::size_t step) const {
+    return positions_m[std::min(step, positions_m.size() - 1)];
+  }
+  [[nodiscard]] std::size_t steps_until(Time end) const {
+    return end <= from ? 0 : static_cast<std::size_t>((end - from) / kStep) + 1;
+  }
+
+  Time from;
+  std::vector<Vector3d> positions_m;
+};
+
+// The first instant at which who flies along the path is nearer to `mover` than `distance_m`.
+std::optional<Time> first_meeting(const Path& path, const Mover& mover, double distance_m) {
+  const std::size_t steps =
+      std::max(path.positions_m.size(),
+               mover.trajectory ? path.steps_until(mover.trajectory->end() + kStep) : 0);
+  double least_m = distance_m + mover.extra_m;
+  for (std::size_t step = 0; step < steps; ++step) {
+    const Time time = path.from + static_cast<int>(step) * kStep;
+    const double apart_m = (path.at(step) - mover.position_at(time)).norm();
+    if (step == 0) {
+      least_m = std::min(least_m, apart_m - kJitterM);
+    } else if (apart_m < least_m) {
       return time;
     }
   }
@@ -33,21 +55,28 @@ std::optional<Time> first_meeting(const Trajectory& flown,
 }  // namespace
 
 bool Traffic::blocks(const Trajectory& planned) const {
+  if (movers_.empty()) {
+    return false;
+  }
+  const Path path(planned, planned.start);
   return std::any_of(movers_.begin(), movers_.end(), [&](const Mover& mover) {
     const double distance_m =
         mover.is_at_rest(planned.start) ? distances_.rest_m : distances_.plan_m;
-    return first_meeting(planned, planned.start, mover, distance_m).has_value();
+    return first_meeting(path, mover, distance_m).has_value();
   });
 }
 
 std::optional<Time> Traffic::must_give_way_at(const Trajectory& flown, Time now) const {
   std::optional<Time> first;
+  if (movers_.empty()) {
+    return first;
+  }
+  const Path path(flown, std::max(now, flown.start));
   for (const Mover& mover : movers_) {
     const double distance_m = mover.is_at_rest(now)
                                   ? std::min(distances_.rest_m, distances_.recheck_m) - kJitterM
                                   : distances_.recheck_m;
-    const std::optional<Time> meeting =
-        first_meeting(flown, std::max(now, flown.start), mover, distance_m);
+    const std::optional<Time> meeting = first_meeting(path, mover, distance_m);
     const bool is_ours =
         meeting && (mover.has_way || mover.is_at_rest(*meeting) || *meeting - now < kLastMoment);
     if (is_ours && (!first || *meeting < *first)) {

@@ -8,8 +8,11 @@ namespace understory::team {
 namespace {
 
 constexpr double kLeastDistanceM = 0.1;  // 1/d has no value at 0
-constexpr double kRestMarginM = 0.1;     // over the safety distance, to who stands
-constexpr double kEdge = 0.8;            // of the range: from here on a vehicle is held back
+constexpr double kDoubtPeriods = 3.0;    // without a word, a vehicle may have stopped
+constexpr Duration kStopStep = std::chrono::milliseconds(50);
+constexpr double kStopSpacingM = 0.3;
+constexpr double kRestMarginM = 0.1;  // over the safety distance, to who stands
+constexpr double kEdge = 0.8;         // of the range: from here on a vehicle is held back
 
 // The part of `box` for `index` of `count`, counted from its low end.
 Box3d part_of(const Box3d& box_m, int index, int count) {
@@ -26,6 +29,19 @@ Box3d part_of(const Box3d& box_m, int index, int count) {
   }
   half.min()[axis] = cut_m;
   return part_of(half, index - low, count - low);
+}
+
+// Who is silent may have stopped anywhere on its way.
+void append_stops(const Trajectory& flown, Time from, Mover stop, std::vector<Mover>& movers) {
+  for (Time time = from; time < flown.end(); time += kStopStep) {
+    const Vector3d place_m = flown.sample(time).position_m;
+    if ((place_m - movers.back().position_m).norm() > kStopSpacingM) {
+      stop.position_m = place_m;
+      movers.push_back(stop);
+    }
+  }
+  stop.position_m = flown.sample(flown.end()).position_m;
+  movers.push_back(stop);
 }
 
 }  // namespace
@@ -78,19 +94,26 @@ Box3d region_of(const TeamConfig& config, const Box3d& box_m) {
 
 Traffic traffic_of(const TeamConfig& config, const Peers& peers, Time now) {
   const SeparationConfig& separation = config.separation;
+  const double doubt_s = kDoubtPeriods / config.exchange.state_rate_hz;
   std::vector<Mover> movers;
   for (const Peer& peer : peers) {
-    const double silent_s = peer.in_contact ? 0.0 : std::max(0.0, to_seconds(now - peer.heard_at));
+    const double silent_s = std::max(0.0, to_seconds(now - peer.heard_at));
     Mover mover;
     mover.position_m = peer.position_m;
     mover.has_way = peer.id < config.id;
-    mover.extra_m = std::min(separation.silent_growth_mps * silent_s, separation.silent_max_m);
-    mover.trajectory = peer.trajectory;
-    if (!peer.is_on_trajectory() && peer.trajectory) {
-      movers.push_back(mover);  // where it says it flies, and where it is
+    mover.extra_m = peer.in_contact ? 0.0
+                                    : std::min(separation.silent_growth_mps * silent_s,
+                                               separation.silent_max_m);
+    if (!peer.is_on_trajectory() || silent_s > doubt_s) {
+      movers.push_back(mover);  // where it is, or was last
     }
-    mover.trajectory = peer.is_on_trajectory() ? peer.trajectory : nullptr;
-    movers.push_back(mover);
+    if (peer.trajectory && silent_s > doubt_s) {
+      append_stops(*peer.trajectory, peer.stated_at, mover, movers);
+    }
+    if (peer.trajectory) {
+      mover.trajectory = peer.trajectory;
+      movers.push_back(mover);
+    }
   }
   return {std::move(movers),
           {separation.plan_distance_m,

@@ -14,6 +14,7 @@ namespace {
 // Between the centres of two vehicles; nearer than this they have met.
 constexpr double kRadii = 2.0;
 constexpr std::int64_t kFramesPerUnion = 15;
+constexpr Duration kLastWords = std::chrono::seconds(5);
 
 SimulationConfig config_of(SimulationConfig config, const Forest& forest, int id) {
   config.explorer.team.id = id;
@@ -205,7 +206,12 @@ TickRow TeamRun::see_and_decide(std::size_t id) {
                                  vehicle.lockstep->vehicle());
 }
 
+// The last of what was seen is told after the last of them has landed.
 bool TeamRun::is_over() const {
+  return are_all_down() && now_ >= last_flight_ + kLastWords;
+}
+
+bool TeamRun::are_all_down() const {
   return std::all_of(vehicles_.begin(), vehicles_.end(), [](const auto& vehicle) {
     return vehicle->is_lost || vehicle->lockstep->is_over();
   });
@@ -233,6 +239,7 @@ void TeamRun::fly(const std::function<bool()>& interrupted,
     }
     on_frame(rows);
     lose_vehicles();
+    last_flight_ = are_all_down() ? last_flight_ : now_;
     if (!is_stopping && interrupted()) {
       is_stopping = true;
       for (const std::unique_ptr<Vehicle>& vehicle : vehicles_) {

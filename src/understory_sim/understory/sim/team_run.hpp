@@ -47,6 +47,7 @@ class TeamRun {
   void add_vehicle(std::size_t id, const Rng& rng, const std::shared_ptr<const DepthRenderer>&);
   void lose_vehicles();
   [[nodiscard]] bool is_over() const;
+  [[nodiscard]] bool are_all_down() const;
   [[nodiscard]] std::vector<Vector3d> others_of(std::size_t id) const;
   void fly_to_next_exposure();
   void judge_separation();
@@ -61,6 +62,7 @@ class TeamRun {
   std::unique_ptr<MissionRecord> record_;  // of all
   MapSnapshot united_;                     // what they have seen together
   Time now_{};
+  Time last_flight_{};
   std::int64_t frame_ = 0;
   double least_separation_m_;
   std::uint64_t meetings_ = 0;
