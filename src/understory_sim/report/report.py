@@ -13,8 +13,9 @@ from pathlib import Path
 from typing import List, Optional, Tuple
 
 import figures
+import team_report
 from matplotlib import pyplot
-from result_folder import FolderError, ResultFolder, read_result_folder
+from result_folder import FolderError, ResultFolder, read_result, read_result_folder
 
 CAPTIONS = {
     "path": "The flown path, coloured by mode, over the true trunks. Shaded: columns of the map, "
@@ -224,7 +225,23 @@ def render(folder: ResultFolder, images: List[Tuple[str, bytes]]) -> str:
 """
 
 
+def make_team_report(path: Path) -> Path:
+    """One of each vehicle, and one of all."""
+    members = team_report.members_of(path)
+    for name, _ in members:
+        make_report(path / name)
+    images = [(n, figure_png(figure)) for n, figure in team_report.all_figures(members).items()]
+    for name, png in images:
+        write_whole(path / f"{name}.png", png)
+    result = read_result(path / "result.json")
+    page = team_report.render(result, images, [name for name, _ in members], sys.modules[__name__])
+    write_whole(path / "report.html", page.encode("utf-8"))
+    return path / "report.html"
+
+
 def make_report(path: Path) -> Path:
+    if not (path / "ticks.csv").exists() and team_report.members_of(path):
+        return make_team_report(path)
     folder = read_result_folder(path)
     images = [(name, figure_png(figure)) for name, figure in figures.all_figures(folder).items()]
     for name, png in images:

@@ -66,7 +66,7 @@ class ResultFolder:
 def read_result_folder(path: Path) -> ResultFolder:
     if not path.is_dir():
         raise FolderError(f"{path}: not a folder")
-    folder = ResultFolder(path, _read_result(path / "result.json"), {})
+    folder = ResultFolder(path, read_result(path / "result.json"), {})
     folder.ticks = _read_ticks(path / "ticks.csv", folder.notes)
     folder.config = _optional(folder, "config.yaml", lambda file: _read_text(file))
     folder.trunks = _optional(folder, "trunks.csv", _read_trunks)
@@ -91,7 +91,7 @@ def _read_text(file: Path) -> str:
         raise FolderError(f"{file}: {error.strerror}") from error
 
 
-def _read_result(file: Path) -> dict:
+def read_result(file: Path) -> dict:
     try:
         result = json.loads(_read_text(file))
     except json.JSONDecodeError as error:

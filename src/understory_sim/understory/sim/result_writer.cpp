@@ -25,7 +25,7 @@ constexpr std::size_t kProbeBytes = 1U << 20U;
 constexpr std::uintmax_t kSpaceBytes = 32U << 20U;  // a long mission writes less
 constexpr int kRowsPerFlush = 64;
 constexpr const char* kMapFile = "map.ot";
-constexpr std::array<const char*, 15> kOwnFiles = {"result.json",
+constexpr std::array<const char*, 17> kOwnFiles = {"result.json",
                                                    "ticks.csv",
                                                    "config.yaml",
                                                    "trunks.csv",
@@ -39,7 +39,9 @@ constexpr std::array<const char*, 15> kOwnFiles = {"result.json",
                                                    "trace.csv",
                                                    "trace.json",
                                                    "latency.csv",
-                                                   "latency.png"};
+                                                   "latency.png",
+                                                   "team_path.png",
+                                                   "team_volume.png"};
 
 [[noreturn]] void fail(const std::string& path, const char* what, int error_number) {
   throw ResultError(path + ": " + what + ": " + std::generic_category().message(error_number));

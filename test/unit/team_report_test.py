@@ -1,0 +1,74 @@
+#!/usr/bin/python3
+# Copyright 2026 the Understory authors
+# SPDX-License-Identifier: BSD-3-Clause
+"""The report of a team's mission: a page of all, one of each vehicle, and what is missing."""
+
+import contextlib
+import io
+import json
+import pathlib
+import sys
+import tempfile
+import unittest
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(ROOT / "src" / "understory_sim" / "report"))
+import report  # noqa: E402
+
+TICKS = (
+    "time_s,x_m,y_m,z_m,vx_mps,vy_mps,vz_mps,speed_mps,yaw_rad,yaw_rate_radps,mode,mission_state,"
+    "coverage,explored_volume_m3,clusters,trails,dormant,target_id,target_x_m,target_y_m,target_z_m,"
+    "clearance_m\n"
+)
+RESULT = {"completed": True, "stop_reason": "nothing_left", "scenario": "<pair>", "collisions": 0}
+RESULT["completion_time_s"] = 71.25
+
+
+class TeamReport(unittest.TestCase):
+    """A team of two that has flown two seconds."""
+
+    def setUp(self):
+        keeper = tempfile.TemporaryDirectory()
+        self.addCleanup(keeper.cleanup)
+        self.folder = pathlib.Path(keeper.name)
+        for number in (0, 1):
+            vehicle = self.folder / f"vehicle_{number}"
+            vehicle.mkdir()
+            (vehicle / "result.json").write_text(json.dumps(RESULT))
+            rows = "".join(
+                f"{t}.0,{t},{number},1,1,0,0,1,0,0,explorer,explore,0.{t}5,{t}0,3,1,0,,,,,2.0\n"
+                for t in range(3)
+            )
+            (vehicle / "ticks.csv").write_text(TICKS + rows)
+        mates = [{"id": 0, "completion_time_s": 70.5}, {"id": 1, "is_lost": True}]
+        content = dict(RESULT, team=mates, least_separation_m=1.75, coverage=0.9975)
+        (self.folder / "result.json").write_text(json.dumps(content))
+
+    def test_there_is_a_page_of_all_and_one_of_each(self):
+        page = report.make_report(self.folder).read_text(encoding="utf-8")
+        self.assertIn("71.2 s", page)
+        self.assertIn("1.75 m", page)
+        self.assertIn("vehicle 1 (lost)", page)
+        self.assertIn("&lt;pair&gt;", page)
+        for number in (0, 1):
+            self.assertIn(f'href="vehicle_{number}/report.html"', page)
+            self.assertTrue((self.folder / f"vehicle_{number}" / "report.html").exists())
+        for name in ("team_path.png", "team_volume.png"):
+            self.assertEqual((self.folder / name).read_bytes()[:4], b"\x89PNG")
+
+    def test_a_collision_is_not_good(self):
+        content = json.loads((self.folder / "result.json").read_text())
+        (self.folder / "result.json").write_text(json.dumps(dict(content, collisions=1)))
+        page = report.make_report(self.folder).read_text(encoding="utf-8")
+        self.assertIn("collided", page)
+
+    def test_a_vehicle_whose_ticks_are_cut_off_in_the_head_is_named(self):
+        (self.folder / "vehicle_1" / "ticks.csv").write_text("time_s\n")
+        said = io.StringIO()
+        with contextlib.redirect_stderr(said):
+            self.assertEqual(report.main([str(self.folder)]), 2)
+        self.assertIn("vehicle_1/ticks.csv:1: no column", said.getvalue())
+
+
+if __name__ == "__main__":
+    unittest.main()
