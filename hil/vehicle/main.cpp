@@ -194,7 +194,7 @@ std::string default_config_folder() {
 int run(const Options& options) {
   SimulationConfig scenario = load_scenario(options.config_folder, options.scenario);
   // The forest decides where the start is.
-  const World world(scenario, options.seed);
+  const World world = World::of_vehicle(scenario, options.seed);
   SimulatedVehicleConfig vehicle = vehicle_of(world.config);
   vehicle.telemetry_rate_hz = options.rate_hz;
   vehicle.is_direct = options.is_direct;

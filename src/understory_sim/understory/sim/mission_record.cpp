@@ -71,6 +71,18 @@ World::World(SimulationConfig wanted, std::uint64_t world_seed)
       truth(std::make_shared<const ForestTruth>(
           build_forest(config.scene, Rng(world_seed).fork("forest"), config.explorer.team.size))) {}
 
+World World::of_vehicle(SimulationConfig wanted, std::uint64_t world_seed) {
+  World world(std::move(wanted), world_seed);
+  const team::TeamConfig& team = world.config.explorer.team;
+  if (team.id >= team.size) {
+    throw ConfigError(fmt::format("team.id: {} is not of a team of {}", team.id, team.size));
+  }
+  if (team.size > 1) {
+    world.config.scene = scene_of_vehicle(world.config.scene, world.truth->forest(), team);
+  }
+  return world;
+}
+
 Vector3d World::start_m() const {
   const StartConfig& start = config.scene.start;
   return {start.x_m, start.y_m, start.z_m};

@@ -31,6 +31,8 @@ struct World {
 
   World(SimulationConfig wanted, std::uint64_t world_seed);
   explicit World(SimulationConfig real) : config(std::move(real)) {}
+  // As the vehicle team.id of a team finds it: with a start of its own. Without a team the same.
+  [[nodiscard]] static World of_vehicle(SimulationConfig wanted, std::uint64_t world_seed);
   [[nodiscard]] Vector3d start_m() const;
   // What of it can be seen from where who starts there can fly; takes up to a few seconds. Null for
   // a real one.

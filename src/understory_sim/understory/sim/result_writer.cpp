@@ -23,7 +23,6 @@ using Json = nlohmann::ordered_json;
 
 constexpr std::size_t kProbeBytes = 1U << 20U;
 constexpr std::uintmax_t kSpaceBytes = 32U << 20U;  // a long mission writes less
-constexpr int kRowsPerFlush = 64;
 constexpr const char* kMapFile = "map.ot";
 constexpr std::array<const char*, 17> kOwnFiles = {"result.json",
                                                    "ticks.csv",
@@ -279,8 +278,8 @@ Topview write_topview(const MapSnapshot& map, const std::string& path) {
   return {voxels.min.x() * cell_m, voxels.min.y() * cell_m, cell_m, size.x(), size.y()};
 }
 
-TickWriter::TickWriter(const std::string& path)
-    : path_(path), file_(std::fopen(path.c_str(), "wb")) {
+TickWriter::TickWriter(const std::string& path, int rows_per_flush)
+    : path_(path), file_(std::fopen(path.c_str(), "wb")), rows_per_flush_(rows_per_flush) {
   if (file_ == nullptr) {
     fail(path, "cannot write", errno);
   }
@@ -288,7 +287,7 @@ TickWriter::TickWriter(const std::string& path)
       "time_s,x_m,y_m,z_m,vx_mps,vy_mps,vz_mps,speed_mps,yaw_rad,yaw_rate_radps,mode,mission_state,"
       "coverage,explored_volume_m3,clusters,trails,dormant,target_id,target_x_m,target_y_m,"
       "target_z_m,clearance_m\n";
-  buffered_rows_ = kRowsPerFlush;  // the header goes out with the first row
+  buffered_rows_ = rows_per_flush_;  // the header goes out with the first row
 }
 
 TickWriter::~TickWriter() {
@@ -334,7 +333,7 @@ void TickWriter::append(const TickRow& row) {
     fmt::format_to(out, "{:.4f}", *row.clearance_m);
   }
   buffer_ += '\n';
-  if (++buffered_rows_ >= kRowsPerFlush) {
+  if (++buffered_rows_ >= rows_per_flush_) {
     flush();
   }
 }

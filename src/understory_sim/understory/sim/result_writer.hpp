@@ -145,14 +145,15 @@ struct TickRow {
 
 class TickWriter {
  public:
-  explicit TickWriter(const std::string& path);  // throws when the file cannot be opened
+  // Throws when the file cannot be opened. So many rows at most are not on disk yet.
+  explicit TickWriter(const std::string& path, int rows_per_flush = 64);
   TickWriter(const TickWriter&) = delete;
   TickWriter& operator=(const TickWriter&) = delete;
   TickWriter(TickWriter&&) = delete;
   TickWriter& operator=(TickWriter&&) = delete;
   ~TickWriter();  // writes what is left, without a word about failure
 
-  // Never throws; a failure to write is kept for close(). At most 64 rows are not on disk yet.
+  // Never throws; a failure to write is kept for close().
   void append(const TickRow& row);
   // Throws when any row was lost. Nothing may be appended afterwards.
   void close();
@@ -167,6 +168,7 @@ class TickWriter {
   std::string path_;
   std::unique_ptr<std::FILE, CloseFile> file_;
   std::string buffer_;
+  int rows_per_flush_;
   int buffered_rows_ = 0;
   int first_errno_ = 0;
 };
