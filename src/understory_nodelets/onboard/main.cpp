@@ -17,8 +17,9 @@
 #include <understory_msgs/MissionCommand.h>
 #include <understory_msgs/MissionResult.h>
 #include <understory_msgs/MissionStatus.h>
+#include <understory_msgs/TeamPeers.h>
 
-#include "understory/nodelets/onboard_config.hpp"
+#include "understory/nodelets/flight_setup.hpp"
 
 namespace understory {
 namespace {
@@ -100,28 +101,43 @@ void print_parameters() {
 }
 
 // In the order in which data flow; loaded from the end, so that readers are there first.
-const std::vector<std::pair<const char*, const char*>> kNodelets = {
+struct NodeletEntry {
+  const char* name;
+  const char* type;
+  bool reads_team_map = false;  // with a team
+};
+constexpr const char* kTeamLink = "team_link";  // without a team it is left out
+const std::vector<NodeletEntry> kNodelets = {
     {"bridge", "Bridge"},
     {"sim_camera", "SimCamera"},
     {"depth_cloud", "DepthCloud"},
     {"mapper", "Mapper"},
-    {"explorer", "Explorer"},
-    {"map_publisher", "MapPublisher"},
+    {kTeamLink, "TeamLink"},
+    {"explorer", "Explorer", true},
+    {"map_publisher", "MapPublisher", true},
     {"monitor", "Monitor"},
-    {"recorder", "Recorder"},
+    {"recorder", "Recorder", true},
 };
 
-bool load_all(nodelet::Loader& loader, const std::vector<std::string>& without) {
+nodelet::M_string remappings_of(const NodeletEntry& nodelet, bool has_team) {
+  nodelet::M_string remappings = ros::names::getRemappings();
+  if (has_team && nodelet.reads_team_map) {
+    remappings[ros::names::resolve("map_updates")] = ros::names::resolve("team_map_updates");
+  }
+  return remappings;
+}
+
+bool load_all(nodelet::Loader& loader, const std::vector<std::string>& without, bool has_team) {
   for (auto entry = kNodelets.rbegin(); entry != kNodelets.rend(); ++entry) {
-    const auto& [name, type] = *entry;
-    if (std::find(without.begin(), without.end(), name) != without.end()) {
+    const bool is_wanted = has_team || entry->name != kTeamLink;
+    if (!is_wanted || std::find(without.begin(), without.end(), entry->name) != without.end()) {
       continue;
     }
-    if (!loader.load(ros::names::resolve(name),
-                     std::string("understory_nodelets/") + type,
-                     ros::names::getRemappings(),
+    if (!loader.load(ros::names::resolve(entry->name),
+                     std::string("understory_nodelets/") + entry->type,
+                     remappings_of(*entry, has_team),
                      {})) {
-      fmt::print(stderr, "onboard: {} could not be started, see above\n", name);
+      fmt::print(stderr, "onboard: {} could not be started, see above\n", entry->name);
       return false;
     }
   }
@@ -132,16 +148,21 @@ bool load_all(nodelet::Loader& loader, const std::vector<std::string>& without) 
 // mission's own word is the result.
 class MissionWatch {
  public:
-  MissionWatch(ros::NodeHandle& nh, bool is_recorded)
+  MissionWatch(ros::NodeHandle& nh, bool is_recorded, bool has_team)
       : is_recorded_(is_recorded),
+        team_at_work_(has_team),
         command_(nh.advertise<understory_msgs::MissionCommand>("command", 10)),
         result_(nh.subscribe("result", 1, &MissionWatch::on_result, this)),
-        status_(nh.subscribe("status", 1, &MissionWatch::on_status, this)) {}
+        status_(nh.subscribe("status", 1, &MissionWatch::on_status, this)) {
+    if (has_team) {
+      peers_ = nh.subscribe("peers", 1, &MissionWatch::on_peers, this);
+    }
+  }
 
   int wait() {
     int handled = 0;
     ros::WallTime stop_at;
-    while (!has_ended_) {
+    while (!has_ended_ || is_needed_by_team(handled)) {
       ros::getGlobalCallbackQueue()->callAvailable(ros::WallDuration(0.1));
       if (g_interrupts > handled) {
         handled = g_interrupts;
@@ -153,7 +174,7 @@ class MissionWatch {
         stop();
         stop_at = ros::WallTime::now();
       }
-      if (handled > 0 && (ros::WallTime::now() - stop_at).toSec() > kStopPatienceS) {
+      if (handled > 0 && !has_ended_ && (ros::WallTime::now() - stop_at).toSec() > kStopPatienceS) {
         fmt::print(stderr, "onboard: no result {} s after the stop\n", kStopPatienceS);
         return 1;
       }
@@ -162,6 +183,18 @@ class MissionWatch {
   }
 
  private:
+  // What it has seen and not told yet would die with it, and others would take it for lost.
+  [[nodiscard]] bool is_needed_by_team(int interrupts) { return team_at_work_ && interrupts == 0; }
+
+  void on_peers(const understory_msgs::TeamPeersConstPtr& update) {
+    using Status = understory_msgs::MissionStatus;
+    team_at_work_ = std::any_of(
+        update->peers.begin(), update->peers.end(), [](const understory_msgs::TeamPeer& peer) {
+          const bool is_over = peer.state == Status::LAND || peer.state == Status::STOPPED;
+          return peer.in_contact != 0 && !is_over;
+        });
+  }
+
   void stop() {
     fmt::print(stderr, "\nonboard: stopping; the vehicle comes to rest first\n");
     auto stop = boost::make_shared<understory_msgs::MissionCommand>();
@@ -187,9 +220,11 @@ class MissionWatch {
   }
 
   bool is_recorded_;
+  bool team_at_work_;  // a team mate in contact is not done yet
   ros::Publisher command_;
   ros::Subscriber result_;
   ros::Subscriber status_;
+  ros::Subscriber peers_;
   bool has_mission_ = false;
   bool has_ended_ = false;
   bool is_good_ = false;
@@ -236,9 +271,11 @@ int run(const Options& options) {
   ros::NodeHandle nh;
   const OwnParameters parameters(options, nh);
   const std::vector<std::string>& without = options.without;
-  MissionWatch watch(nh, std::find(without.begin(), without.end(), "recorder") == without.end());
+  const bool has_team = load_flight_setup(nh).config.explorer.team.size > 1;
+  const bool is_recorded = std::find(without.begin(), without.end(), "recorder") == without.end();
+  MissionWatch watch(nh, is_recorded, has_team);
   nodelet::Loader loader(ros::NodeHandle("~"));
-  const int status = load_all(loader, options.without) ? watch.wait() : 2;
+  const int status = load_all(loader, options.without, has_team) ? watch.wait() : 2;
   loader.clear();
   return status;
 }

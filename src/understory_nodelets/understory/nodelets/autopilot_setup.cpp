@@ -46,7 +46,7 @@ std::unique_ptr<Autopilot> make_autopilot(const FlightSetup& setup) {
   if (bus.interface != kMemory) {
     return can_autopilot(bus);
   }
-  const World world(setup.config, setup.seed);
+  const World world = World::of_vehicle(setup.config, setup.seed);
   auto simulated = std::make_unique<SimulatedBus>(vehicle_of(world.config),
                                                   bus.link,
                                                   world_from_start(world.config.scene.start),

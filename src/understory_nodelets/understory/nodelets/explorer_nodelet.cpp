@@ -1,10 +1,10 @@
 // Copyright 2026 the Understory authors
 // SPDX-License-Identifier: BSD-3-Clause
 //
-// The mission. In: map_updates, odometry (where the vehicle starts), command, flight_status. Out:
-// trajectory, status, and to look at: markers, planned_path. Services start, pause, return_home,
-// land, stop. A stage that fails, or no map for too long, ends the mission with the vehicle at
-// rest.
+// The mission. In: map_updates, odometry (where the vehicle starts), command, flight_status, and
+// with a team peers (its map_updates are then remapped to team_map_updates). Out: trajectory,
+// status, and to look at: markers, planned_path. Services start, pause, return_home, land, stop. A
+// stage that fails, or no map for too long, ends the mission with the vehicle at rest.
 #include <memory>
 
 #include <nav_msgs/Path.h>
@@ -18,6 +18,7 @@
 #include "understory/nodelets/guarded_nodelet.hpp"
 #include "understory/nodelets/map_update.hpp"
 #include "understory/nodelets/markers.hpp"
+#include "understory/nodelets/peers_update.hpp"
 #include "understory/nodelets/trajectory_update.hpp"
 
 namespace understory {
@@ -38,6 +39,9 @@ class ExplorerNodelet : public GuardedNodelet {
     const ros::TransportHints hints = ros::TransportHints().tcpNoDelay();
     odometry_subscriber_ = nh.subscribe("odometry", 1, &ExplorerNodelet::on_odometry, this, hints);
     map_subscriber_ = nh.subscribe("map_updates", 1, &ExplorerNodelet::on_map, this, hints);
+    if (setup_.config.explorer.team.size > 1) {
+      peers_subscriber_ = nh.subscribe("peers", 1, &ExplorerNodelet::on_peers, this, hints);
+    }
     flight_subscriber_ = nh.subscribe("flight_status", 1, &ExplorerNodelet::on_flight, this);
     command_subscriber_ = nh.subscribe("command", 10, &ExplorerNodelet::on_command, this);
     advertise_service("start", Command::START);
@@ -76,6 +80,8 @@ class ExplorerNodelet : public GuardedNodelet {
   void on_map(const MapUpdatePtr& update) {
     guarded([&] { decide(*update); });
   }
+
+  void on_peers(const PeersUpdatePtr& peers) { peers_ = peers; }
 
   void on_command(const understory_msgs::MissionCommandConstPtr& command) {
     guarded([&] { static_cast<void>(obey(command->command)); });
@@ -192,6 +198,9 @@ class ExplorerNodelet : public GuardedNodelet {
     if (mission_->state() == MissionState::kWaiting && !has_failed_) {
       start_when_armed();
     }
+    if (peers_) {
+      mission_->set_peers(peers_->peers, now);
+    }
     if (!has_failed_) {
       const MissionStep step = mission_->on_map(map, now);
       const bool is_handed_out = hand_out(step.published);
@@ -288,6 +297,7 @@ class ExplorerNodelet : public GuardedNodelet {
   std::unique_ptr<MapReceiver> receiver_;
   std::optional<VehicleState> start_state_;
   std::unique_ptr<Mission> mission_;
+  PeersUpdatePtr peers_;  // newest
   understory_msgs::FlightStatus flight_;
   bool is_start_wanted_ = false;
   bool has_failed_ = false;
@@ -300,6 +310,7 @@ class ExplorerNodelet : public GuardedNodelet {
   ros::Publisher path_publisher_;
   ros::Subscriber odometry_subscriber_;
   ros::Subscriber map_subscriber_;
+  ros::Subscriber peers_subscriber_;
   ros::Subscriber command_subscriber_;
   ros::Subscriber flight_subscriber_;
   std::vector<ros::ServiceServer> services_;

@@ -3,7 +3,9 @@
 //
 // In: camera/depth/points with points_info (organised) and lidar/points (any cloud), each with its
 // pose from tf2 at its own stamp. Out: map_updates. A cloud whose pose is not known in time is
-// skipped and counted. The first pose is where the vehicle starts: the launch site is free.
+// skipped and counted. The first pose is where the vehicle starts: the launch site is free. With a
+// team, what is measured on team mates (peers) is not mapped.
+#include <algorithm>
 #include <memory>
 
 #include <pcl/filters/voxel_grid.h>
@@ -21,6 +23,8 @@
 #include "understory/nodelets/guarded_nodelet.hpp"
 #include "understory/nodelets/lidar_points.hpp"
 #include "understory/nodelets/map_update.hpp"
+#include "understory/nodelets/peers_update.hpp"
+#include "understory/team/teammate_mask.hpp"
 
 namespace understory {
 namespace {
@@ -30,6 +34,17 @@ Mapper make_mapper(const FlightSetup& setup) {
   return setup.resume_file.empty()
              ? Mapper(setup.config.explorer.map, box_m)
              : Mapper(load_octomap(setup.resume_file, setup.config.explorer.map, box_m));
+}
+
+// The points are shared with others and stay as they are.
+DepthImage depth_of(const Cloud& cloud, DepthImage image) {
+  image.width_px = static_cast<int>(cloud.width);
+  image.height_px = static_cast<int>(cloud.height);
+  image.z_m.resize(cloud.size());
+  std::transform(cloud.begin(), cloud.end(), image.z_m.begin(), [](const pcl::PointXYZ& point) {
+    return point.z;
+  });
+  return image;
 }
 
 }  // namespace
@@ -49,8 +64,14 @@ class MapperNodelet : public GuardedNodelet {
     info_subscriber_ = nh.subscribe("camera/depth/points_info", 1, &MapperNodelet::on_info, this);
     cloud_subscriber_ =
         nh.subscribe("camera/depth/points", 1, &MapperNodelet::on_cloud, this, hints);
+    mask_radius_m_ = setup.config.explorer.team.separation.mask_radius_m;
+    if (setup.config.explorer.team.size > 1) {
+      peers_subscriber_ = nh.subscribe("peers", 1, &MapperNodelet::on_peers, this, hints);
+    }
     lidar_subscriber_ = nh.subscribe("lidar/points", 1, &MapperNodelet::on_lidar, this, hints);
   }
+
+  void on_peers(const PeersUpdatePtr& peers) { peers_ = peers; }
 
   void on_info(const sensor_msgs::CameraInfoConstPtr& info) {
     guarded([&] { camera_ = to_camera_model(*info, max_range_m_); });
@@ -98,14 +119,44 @@ class MapperNodelet : public GuardedNodelet {
     if (!pose || !mark_launch_site(stamp)) {
       return;
     }
+    publish(
+        mapper_->integrate(*camera_, view_of(cloud, *pose, to_time(stamp)), *pose, to_time(stamp)),
+        stamp,
+        begin_ns);
+  }
+
+  // The depths as they are, or a copy without team mates where some may be in view.
+  DepthView view_of(const Cloud& cloud, const Pose& pose, Time time) {
+    const std::vector<Vector3d> mates_m =
+        places_near(peers_, time, pose.translation(), camera_->max_range_m + mask_radius_m_);
+    const bool fits = static_cast<int>(cloud.width) == camera_->width_px &&
+                      static_cast<int>(cloud.height) == camera_->height_px;
+    if (!mates_m.empty() && fits) {
+      masked_ = team::mask_teammates(
+          depth_of(cloud, std::move(masked_)), *camera_, pose, mates_m, mask_radius_m_);
+      count("frames_masked");
+      return masked_.view();
+    }
     constexpr std::size_t kFloatsPerPoint = sizeof(pcl::PointXYZ) / sizeof(float);
-    const DepthView depth{cloud.empty() ? nullptr : &cloud.points.front().z,
-                          kFloatsPerPoint,
-                          static_cast<int>(cloud.width),
-                          static_cast<int>(cloud.height)};
-    const Result<IntegrateCounts, IntegrateError> done =
-        mapper_->integrate(*camera_, depth, *pose, to_time(stamp));
-    publish(done, stamp, begin_ns);
+    return {cloud.empty() ? nullptr : &cloud.points.front().z,
+            kFloatsPerPoint,
+            static_cast<int>(cloud.width),
+            static_cast<int>(cloud.height)};
+  }
+
+  // Of the sensor's own copy.
+  void drop_teammates(const Pose& pose, Time time, Cloud& points) const {
+    const std::vector<Vector3d> mates_m = places_near(
+        peers_, time, pose.translation(), onboard_.cloud.lidar_range_m + mask_radius_m_);
+    const auto is_mate = [&](const pcl::PointXYZ& point) {
+      const Vector3d at_m = pose * point.getVector3fMap().cast<double>();
+      return std::any_of(mates_m.begin(), mates_m.end(), [&](const Vector3d& mate_m) {
+        return (at_m - mate_m).norm() <= mask_radius_m_;
+      });
+    };
+    if (!mates_m.empty()) {
+      points.erase(std::remove_if(points.begin(), points.end(), is_mate), points.end());
+    }
   }
 
   void integrate_lidar(const sensor_msgs::PointCloud2& message) {
@@ -130,6 +181,7 @@ class MapperNodelet : public GuardedNodelet {
       grid.filter(*thinned);
       points = std::move(thinned);
     }
+    drop_teammates(*pose, to_time(stamp), *points);
     const PointsView view{points->empty() ? nullptr : points->points.front().data,
                           sizeof(pcl::PointXYZ) / sizeof(float),
                           points->size()};
@@ -163,12 +215,16 @@ class MapperNodelet : public GuardedNodelet {
   std::unique_ptr<Mapper> mapper_;
   bool has_launch_site_ = false;
   std::optional<CameraModel> camera_;
+  double mask_radius_m_ = 0.0;
+  PeersUpdatePtr peers_;  // newest
+  DepthImage masked_;     // its memory is used again
   tf2_ros::Buffer transforms_;
   std::unique_ptr<tf2_ros::TransformListener> listener_;  // with a thread of its own
   ros::Publisher publisher_;
   ros::Subscriber info_subscriber_;
   ros::Subscriber cloud_subscriber_;
   ros::Subscriber lidar_subscriber_;
+  ros::Subscriber peers_subscriber_;
 };
 
 }  // namespace understory

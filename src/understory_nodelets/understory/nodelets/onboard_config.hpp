@@ -7,6 +7,7 @@
 #include <string>
 
 #include "understory/bridge/flight_loop.hpp"
+#include "understory/dds/dds_config.hpp"
 #include "understory/nodelets/bus_config.hpp"
 
 namespace understory {
@@ -97,6 +98,7 @@ struct OnboardConfig {
   PublishConfig publish;
   FlightConfig flight;
   BusConfig bus;
+  dds::DdsConfig dds;
 
   void visit(FieldVisitor& f) {
     f.section("cloud", cloud, "From depth images and LiDAR to clouds.");
@@ -105,6 +107,7 @@ struct OnboardConfig {
     f.section("publish", publish, "What others may look at.");
     f.section("flight", flight, "The flight thread.");
     f.section("bus", bus, "The vehicle at the other end.");
+    f.section("dds", dds, "The radio to team mates; without a team it is not used.");
   }
 };
 

@@ -9,6 +9,7 @@
 #include <filesystem>
 #include <memory>
 
+#include <fmt/core.h>
 #include <pluginlib/class_list_macros.hpp>
 #include <understory_msgs/FlightStatus.h>
 #include <understory_msgs/MissionResult.h>
@@ -29,6 +30,7 @@ namespace fs = std::filesystem;
 constexpr double kSettleS = 8.0;    // to land or come to rest after the mission's last word
 constexpr double kSilenceS = 20.0;  // without a word from the mission, it is over
 constexpr double kStillMps = 0.05;
+constexpr int kTicksPerFlush = 8;  // others look at them while it flies
 
 }  // namespace
 
@@ -47,8 +49,8 @@ class RecorderNodelet : public GuardedNodelet {
     const FlightSetup setup = load_flight_setup(nh);
     bool simulated = true;
     nh.param("simulated", simulated, true);
-    world_ = simulated ? std::make_unique<World>(setup.config, setup.seed)
-                       : std::make_unique<World>(setup.config);
+    world_ = std::make_unique<World>(simulated ? World::of_vehicle(setup.config, setup.seed)
+                                               : World(setup.config));
     receiver_ =
         std::make_unique<MapReceiver>(setup.config.explorer.map, world_->config.scene.box.box_m());
     bool live = false;
@@ -57,7 +59,8 @@ class RecorderNodelet : public GuardedNodelet {
     nh.param("result_folder", folder_, std::string());
     if (!folder_.empty()) {
       prepare_result_folder(folder_);
-      ticks_ = std::make_unique<TickWriter>((fs::path(folder_) / "ticks.csv").string());
+      ticks_ =
+          std::make_unique<TickWriter>((fs::path(folder_) / "ticks.csv").string(), kTicksPerFlush);
       traces_ = std::make_unique<TraceWriter>((fs::path(folder_) / "trace.csv").string());
     }
     coverage_ = world_->coverage_truth();
@@ -109,6 +112,7 @@ class RecorderNodelet : public GuardedNodelet {
       }
       if (!status_) {
         record_ = std::make_unique<MissionRecord>(*world_, coverage_, status->started_at);
+        write_start(status->started_at);
       }
       status_ = status;
       status_seen_ns_ = steady_ns();
@@ -153,6 +157,14 @@ class RecorderNodelet : public GuardedNodelet {
     if ((status_->is_over() && (flight_.down != 0 || is_still || over_s > kSettleS)) ||
         silent_s > kSilenceS) {
       finish();
+    }
+  }
+
+  // When the ticks' clock begins: those of a team are compared on one clock, of a lost one too.
+  void write_start(Time start) const {
+    if (!folder_.empty()) {
+      write_text_file((fs::path(folder_) / "start.json").string(),
+                      fmt::format("{{\"started_at_s\": {:.6f}}}\n", to_seconds(start)));
     }
   }
 

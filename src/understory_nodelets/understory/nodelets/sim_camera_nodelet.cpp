@@ -2,7 +2,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
 // Stands in for a depth camera's driver: exposes at the odometry's stamps, so that tf2 knows the
-// pose of every exposure exactly. In: odometry. Out: camera/depth/image_rect (32FC1, metres, +inf
+// pose of every exposure exactly. In: odometry, and with a team peers: they are seen where they say
+// they are. Out: camera/depth/image_rect (32FC1, metres, +inf
 // beyond range), camera/depth/camera_info.
 #include <memory>
 
@@ -14,10 +15,12 @@
 #include "understory/nodelets/conversions.hpp"
 #include "understory/nodelets/flight_setup.hpp"
 #include "understory/nodelets/guarded_nodelet.hpp"
+#include "understory/nodelets/peers_update.hpp"
 #include "understory/nodelets/pool.hpp"
 #include "understory/sim/depth_noise.hpp"
 #include "understory/sim/depth_renderer.hpp"
 #include "understory/sim/mission_record.hpp"
+#include "understory/sim/teammates_in_view.hpp"
 
 namespace understory {
 
@@ -26,7 +29,7 @@ class SimCameraNodelet : public GuardedNodelet {
   void start() override {
     ros::NodeHandle& nh = getNodeHandle();
     const FlightSetup setup = load_flight_setup(nh);
-    const World world(setup.config, setup.seed);
+    const World world = World::of_vehicle(setup.config, setup.seed);
     camera_ = CameraModel(setup.config.explorer.camera);
     body_from_optical_ = body_from_optical(setup.config.explorer.camera);
     period_ = ros::Duration(1.0 / setup.config.explorer.camera.rate_hz);
@@ -37,9 +40,15 @@ class SimCameraNodelet : public GuardedNodelet {
     info_.header.frame_id = setup.onboard.frames.camera;
     image_publisher_ = nh.advertise<sensor_msgs::Image>("camera/depth/image_rect", 1);
     info_publisher_ = nh.advertise<sensor_msgs::CameraInfo>("camera/depth/camera_info", 1);
+    vehicle_radius_m_ = setup.config.explorer.plan.vehicle_radius_m;
+    if (setup.config.explorer.team.size > 1) {
+      peers_subscriber_ = nh.subscribe("peers", 1, &SimCameraNodelet::on_peers, this);
+    }
     odometry_subscriber_ = nh.subscribe(
         "odometry", 1, &SimCameraNodelet::on_odometry, this, ros::TransportHints().tcpNoDelay());
   }
+
+  void on_peers(const PeersUpdatePtr& peers) { peers_ = peers; }
 
   void on_odometry(const nav_msgs::OdometryConstPtr& odometry) {
     const ros::Time stamp = odometry->header.stamp;
@@ -61,10 +70,15 @@ class SimCameraNodelet : public GuardedNodelet {
     Pose world_from_body = Pose::Identity();
     world_from_body.translation() = vehicle->position_m;
     world_from_body.linear() = vehicle->world_from_body.toRotationMatrix();
-    depth_ = add_noise(
-        renderer_->render(camera_, world_from_body * body_from_optical_, std::move(depth_)),
-        noise_,
-        *noise_rng_);
+    const Pose world_from_optical = world_from_body * body_from_optical_;
+    depth_ = renderer_->render(camera_, world_from_optical, std::move(depth_));
+    const std::vector<Vector3d> mates_m = places_near(peers_,
+                                                      to_time(odometry.header.stamp),
+                                                      world_from_optical.translation(),
+                                                      camera_.max_range_m + vehicle_radius_m_);
+    depth_ =
+        add_teammates(std::move(depth_), camera_, world_from_optical, mates_m, vehicle_radius_m_);
+    depth_ = add_noise(std::move(depth_), noise_, *noise_rng_);
     const std::shared_ptr<sensor_msgs::Image> image = images_.take();
     fill(odometry.header.stamp, *image);
     auto info = boost::make_shared<sensor_msgs::CameraInfo>(info_);
@@ -95,12 +109,15 @@ class SimCameraNodelet : public GuardedNodelet {
   DepthNoiseConfig noise_;
   std::unique_ptr<Rng> noise_rng_;
   std::unique_ptr<DepthRenderer> renderer_;
+  double vehicle_radius_m_ = 0.0;
+  PeersUpdatePtr peers_;  // newest
   DepthImage depth_;
   sensor_msgs::CameraInfo info_;
   Pool<sensor_msgs::Image> images_;
   ros::Publisher image_publisher_;
   ros::Publisher info_publisher_;
   ros::Subscriber odometry_subscriber_;
+  ros::Subscriber peers_subscriber_;
 };
 
 }  // namespace understory
