@@ -20,12 +20,15 @@ import xmlrpc.client
 from pathlib import Path
 from typing import List, NoReturn, Optional
 
+import fly_team
+
 DEFAULT_PORT = 11311
 MASTER_PATIENCE_S = 20.0
 STOP_PATIENCE_S = 30.0
 VEHICLE_PATIENCE_S = 1.0  # to find fault with its options and its bus
 MEMORY = "memory"
 OWN_BUS = "vcan0"
+MOST_VEHICLES = 10  # that find each other on one machine
 PROVIDER = Path(__file__).resolve().parents[3] / "hil/provider/hil.py"
 PASSED_ON = ("forest", "crop", "strategy", "speed-cap", "resume")
 
@@ -47,6 +50,15 @@ def parse_arguments(words: List[str]) -> argparse.Namespace:
     parser.add_argument("--out", help="result folder (default: results/SCENARIO_SEED_onboard)")
     parser.add_argument("--camera-size", help="WxH of the simulated camera, in pixels")
     parser.add_argument("--overrides", default="", help="YAML over the scenario's keys")
+    parser.add_argument(
+        "--team", type=int, default=1, metavar="N",
+        help="N vehicles, each with a process, a ROS master and a bus of its own; results in "
+        "vehicle_0, vehicle_1, ... of the result folder",
+    )
+    parser.add_argument(
+        "--kill", action="append", default=[], metavar="ID@SECONDS",
+        help="with --team: this vehicle is lost then, with its onboard process",
+    )
     parser.add_argument("--master", help="URI of a running ROS master instead of an own one")
     parser.add_argument(
         "--bus",
@@ -165,9 +177,9 @@ def bus_override(arguments: argparse.Namespace, folder: Path) -> str:
     return f"bus: {{interface: {arguments.bus}{log}}}\n"
 
 
-def with_own_bus(words: List[str]) -> NoReturn:
+def with_own_bus(words: List[str], buses: int) -> NoReturn:
     """Once more, where there is a CAN bus."""
-    command = ["/usr/bin/python3", "-B", str(PROVIDER), "--"]
+    command = ["/usr/bin/python3", "-B", str(PROVIDER), "--interfaces", str(buses), "--"]
     command += ["/usr/bin/python3", str(Path(__file__).resolve()), "--bus", OWN_BUS, *words]
     os.execv(command[0], command)
 
@@ -236,13 +248,31 @@ def report(folder: Path) -> bool:
     return good
 
 
+def check_team(arguments: argparse.Namespace) -> None:
+    if not 1 <= arguments.team <= MOST_VEHICLES:
+        raise FlyError(f"--team {arguments.team}: must be 1 to {MOST_VEHICLES}")
+    if arguments.team == 1 and arguments.kill:
+        raise FlyError("--kill: needs --team")
+    is_bus_taken = arguments.bus not in (None, MEMORY, OWN_BUS)
+    if arguments.team > 1 and (arguments.master or arguments.no_vehicle or is_bus_taken):
+        raise FlyError("--team: not with --master, --no-vehicle or a bus of yours")
+    try:
+        for text in arguments.kill:
+            fly_team.parse_kill(text, arguments.team)
+    except ValueError as error:
+        raise FlyError(str(error)) from error
+
+
 def fly(arguments: argparse.Namespace) -> int:
-    name = f"{Path(arguments.scenario).stem}_{arguments.seed}_onboard"
+    team = f"_team{arguments.team}" if arguments.team > 1 else ""
+    name = f"{Path(arguments.scenario).stem}_{arguments.seed}{team}_onboard"
     folder = Path(arguments.out or Path("results") / name).resolve()
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise FlyError(f"{folder}: cannot be made: {error.strerror}") from error
+    if arguments.team > 1:
+        return fly_team.fly_team(arguments, folder, sys.modules[__name__])
     command = onboard_command(arguments, folder)
     master, uri = None, arguments.master or os.environ.get("ROS_MASTER_URI", "")
     if arguments.master and not is_master(arguments.master):
@@ -268,9 +298,10 @@ def fly(arguments: argparse.Namespace) -> int:
 
 def main() -> int:
     arguments = parse_arguments(sys.argv[1:])
-    if arguments.bus is None:
-        with_own_bus(sys.argv[1:])
     try:
+        check_team(arguments)
+        if arguments.bus is None:
+            with_own_bus(sys.argv[1:], arguments.team)
         return fly(arguments)
     except FlyError as error:
         print(f"understory fly: {error}", file=sys.stderr)
