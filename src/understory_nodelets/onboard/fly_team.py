@@ -85,6 +85,7 @@ class Mate:
     def __init__(self, number: int, folder: Path) -> None:
         self.number = number
         self.folder = folder
+        self.uri = ""
         self.onboard: Optional[subprocess.Popen] = None
         self.helpers: List[subprocess.Popen] = []  # its vehicle, its master
         self.is_killed = False
@@ -175,8 +176,12 @@ def least_separation_m(tracks: List[Track]) -> Optional[float]:
 
 
 def overrides_of(arguments: argparse.Namespace, number: int) -> str:
-    """What a vehicle is told over the scenario: the size of its team, and which one it is."""
-    return f"team: {{size: {arguments.team}, id: {number}}}\n{arguments.overrides}"
+    """What a vehicle is told over the scenario: the user's, and which one of its team it is."""
+    import yaml  # pylint: disable=import-outside-toplevel  # --help needs Python alone
+
+    told = yaml.safe_load(arguments.overrides) or {}
+    told["team"] = {**told.get("team", {}), "size": arguments.team, "id": number}
+    return yaml.safe_dump(told)
 
 
 class Team:
@@ -194,26 +199,33 @@ class Team:
         )
 
     def start(self) -> None:
+        """What takes the least time of the machine first: so none waits long for another."""
         for mate in self.mates:
             mate.folder.mkdir(parents=True, exist_ok=True)
             for name in ("ticks.csv", "start.json", "result.json"):
                 (mate.folder / name).unlink(missing_ok=True)  # of a flight before
-            arguments = copy.copy(self.arguments)
-            arguments.quiet = True
-            arguments.overrides = overrides_of(self.arguments, mate.number)
-            arguments.onboard_overrides = self.dds + (self.arguments.onboard_overrides or "")
-            if arguments.bus != self.tools.MEMORY:
-                arguments.bus = f"vcan{mate.number}"
-            master, uri = self.tools.start_master(mate.folder / "master.log")
+            master, mate.uri = self.tools.start_master(mate.folder / "master.log")
             mate.helpers.append(master)
-            print(f"vehicle {mate.number}: export ROS_MASTER_URI={uri}", flush=True)
+            print(f"vehicle {mate.number}: export ROS_MASTER_URI={mate.uri}", flush=True)
+        told = [self._arguments_of(mate.number) for mate in self.mates]
+        for mate, arguments in zip(self.mates, told):
             if arguments.bus != self.tools.MEMORY:
                 mate.helpers.append(self.tools.start_vehicle(arguments, mate.folder))
-            self._start_onboard(mate, self.tools.onboard_command(arguments, mate.folder), uri)
+        for mate, arguments in zip(self.mates, told):
+            self._start_onboard(mate, self.tools.onboard_command(arguments, mate.folder))
+
+    def _arguments_of(self, number: int) -> argparse.Namespace:
+        arguments = copy.copy(self.arguments)
+        arguments.quiet = True
+        arguments.overrides = overrides_of(self.arguments, number)
+        arguments.onboard_overrides = self.dds + (self.arguments.onboard_overrides or "")
+        if arguments.bus != self.tools.MEMORY:
+            arguments.bus = f"vcan{number}"
+        return arguments
 
     @staticmethod
-    def _start_onboard(mate: Mate, command: List[str], uri: str) -> None:
-        environment = {**os.environ, "ROS_MASTER_URI": uri}
+    def _start_onboard(mate: Mate, command: List[str]) -> None:
+        environment = {**os.environ, "ROS_MASTER_URI": mate.uri}
         environment.setdefault("ROS_IP", "127.0.0.1")
         environment.setdefault("ROSCONSOLE_FORMAT", "${message}")
         with open(mate.folder / "onboard.log", "w", encoding="utf-8") as log:
