@@ -28,6 +28,12 @@ class FlyTeam(unittest.TestCase):
 
         self.assertAlmostEqual(least_separation_m([lost, passing]), 0.7)
 
+    def test_who_is_lost_counts_until_its_last_word(self):
+        lost = [(0.0, 5.0, 0.0, 1.0), (1.0, 3.0, 0.0, 1.0)]
+        passing = [(0.0, 3.0, 9.0, 1.0), (1.0, 3.0, 4.0, 1.0), (9.0, 3.0, 0.1, 1.0)]
+
+        self.assertAlmostEqual(least_separation_m([lost, passing], (True, False)), 4.0)
+
     def test_one_alone_has_no_separation(self):
         self.assertIsNone(least_separation_m([[(0.0, 0.0, 0.0, 1.0)]]))
 

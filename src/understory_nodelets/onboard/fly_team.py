@@ -18,7 +18,7 @@ import subprocess
 import sys
 import time
 from pathlib import Path
-from typing import Dict, List, Optional, Tuple
+from typing import Dict, List, Optional, Sequence, Tuple
 
 SHOW_S = 1.0
 LEFT_BEHIND_S = 45.0  # after an interrupt; then what still runs is killed
@@ -160,13 +160,18 @@ def position_at(track: Track, times: List[float], time_s: float) -> List[float]:
     return [a + part * (b - a) for a, b in zip(begin[1:], end[1:])]
 
 
-def least_separation_m(tracks: List[Track]) -> Optional[float]:
-    """On one clock, between any two."""
+def least_separation_m(tracks: List[Track], lost: Sequence[bool] = ()) -> Optional[float]:
+    """On one clock, between any two. Who is lost counts until its last word: where it went from
+    there nobody knows, and others take it to have flown its last trajectory to the end."""
+    lost = lost or [False] * len(tracks)
+    ends = [track[-1][0] if is_lost else math.inf for track, is_lost in zip(tracks, lost)]
     least = None
     clocks = [[row[0] for row in track] for track in tracks]
     for i in range(len(tracks)):
         for j in range(i):
-            for time_s in sorted(clocks[i] + clocks[j]):
+            for time_s in clocks[i] + clocks[j]:
+                if time_s > min(ends[i], ends[j]):
+                    continue
                 apart_m = math.dist(
                     position_at(tracks[i], clocks[i], time_s),
                     position_at(tracks[j], clocks[j], time_s),
@@ -296,8 +301,10 @@ class Team:
         text = "team: NOT completed"
         if ends and all(end is not None for end in ends) and known:
             text = f"team: completed after {max(end for end in ends if end) - min(known):.1f} s"
-        tracks = [track for track in (mate.track() for mate in self.mates) if track is not None]
-        least = least_separation_m(tracks)
+        flown = [(mate.track(), mate.is_killed) for mate in self.mates]
+        tracks = [track for track, _ in flown if track is not None]
+        lost = [is_lost for track, is_lost in flown if track is not None]
+        least = least_separation_m(tracks, lost)
         print(text + ("" if least is None else f", least separation {least:.2f} m"), flush=True)
         return status
 
