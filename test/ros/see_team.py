@@ -27,8 +27,6 @@ from fly_team import Mate, least_separation_m  # noqa: E402  pylint: disable=wro
 PATIENCE_S = 110
 SAFETY_DISTANCE_M = 0.8
 LOST_AT_S = 6.0
-# In a box of 10 m nothing is left of it where one keeps clear of the lost by the usual distance.
-SMALL_BOX = "team: {separation: {silent_max_m: 0.3}}"
 SMALL_CAMERA = "160x120"  # two vehicles on one machine
 
 
@@ -78,7 +76,7 @@ class SeeTeam(FlightTest):
         self.assert_apart(mates)
 
     def test_one_goes_on_when_the_other_is_lost(self):
-        status, mates = self.fly("--kill", f"0@{LOST_AT_S}", "--overrides", SMALL_BOX)
+        status, mates = self.fly("--kill", f"0@{LOST_AT_S}")
 
         self.assertEqual(status, 0)
         self.assertFalse((mates[0].folder / "result.json").exists())
