@@ -143,12 +143,19 @@ TEST(TeamTraffic, ASilentTeamMateIsGivenMoreRoomTheLongerItIsSilent) {
   TeamConfig config;
   Peer silent = peer_at({3.0, 0.0, 1.0});
   silent.in_contact = false;
-  const Vector3d beside_m(4.5, 0.0, 1.0);
+  // Past it, 1.3 m away.
+  Trajectory past;
+  for (int i = 0; i < 60; ++i) {
+    past.position.control_points.emplace_back(0.1 * i, 1.3, 1.0);
+  }
+  past.position.control_points.insert(
+      past.position.control_points.end(), 3, past.position.control_points.back());
+  past.yaw.control_points.assign(4, 0.0);
   const Time soon{std::chrono::seconds(1)};
   const Time later{std::chrono::seconds(10)};
 
-  EXPECT_FALSE(traffic_of(config, {silent}, soon).is_occupied(beside_m, soon));
-  EXPECT_TRUE(traffic_of(config, {silent}, later).is_occupied(beside_m, later));
+  EXPECT_EQ(traffic_of(config, {silent}, soon).obstruction_of(past), Obstruction::kNone);
+  EXPECT_EQ(traffic_of(config, {silent}, later).obstruction_of(past), Obstruction::kStanding);
 }
 
 }  // namespace

@@ -41,37 +41,57 @@ Traffic with_standing(const Vector3d& position_m, double extra_m = 0.0) {
 TEST(Traffic, BlocksWhatMeetsSomeone) {
   const TrajectoryPtr eastward = line({0, 0, 1}, {10, 0, 1});
 
-  EXPECT_TRUE(with(line({10, 0, 1}, {0, 0, 1})).blocks(*eastward));
-  EXPECT_TRUE(with(line({5, 5, 1}, {5, -5, 1})).blocks(*eastward));
-  EXPECT_FALSE(with(line({10, 3, 1}, {0, 3, 1})).blocks(*eastward));
+  EXPECT_NE(with(line({10, 0, 1}, {0, 0, 1})).obstruction_of(*eastward), Obstruction::kNone);
+  EXPECT_NE(with(line({5, 5, 1}, {5, -5, 1})).obstruction_of(*eastward), Obstruction::kNone);
+  EXPECT_EQ(with(line({10, 3, 1}, {0, 3, 1})).obstruction_of(*eastward), Obstruction::kNone);
 }
 
 TEST(Traffic, DoesNotBlockWhatCrossesAfterTheOtherHasPassed) {
   const TrajectoryPtr eastward = line({0, 0, 1}, {10, 0, 1});
 
   // The other is at the crossing after one second, this one after five.
-  EXPECT_FALSE(with(line({5, 1, 1}, {5, -9, 1})).blocks(*eastward));
+  EXPECT_EQ(with(line({5, 1, 1}, {5, -9, 1})).obstruction_of(*eastward), Obstruction::kNone);
 }
 
 TEST(Traffic, BlocksAnEndWhereTheOtherComesLater) {
   const TrajectoryPtr short_way = line({0, 0, 1}, {2, 0, 1});
 
-  EXPECT_TRUE(with(line({12, 0, 1}, {2, 0, 1})).blocks(*short_way));
+  EXPECT_NE(with(line({12, 0, 1}, {2, 0, 1})).obstruction_of(*short_way), Obstruction::kNone);
 }
 
 TEST(Traffic, BlocksWhatPassesSomeoneWhoStands) {
   const TrajectoryPtr eastward = line({0, 0, 1}, {10, 0, 1});
 
-  EXPECT_TRUE(with_standing({5, 0.8, 1}).blocks(*eastward));
-  EXPECT_FALSE(with_standing({5, 1, 1}).blocks(*eastward));
-  EXPECT_TRUE(with_standing({5, 1, 1}, 0.2).blocks(*eastward));
+  EXPECT_NE(with_standing({5, 0.8, 1}).obstruction_of(*eastward), Obstruction::kNone);
+  EXPECT_EQ(with_standing({5, 1, 1}).obstruction_of(*eastward), Obstruction::kNone);
+  EXPECT_NE(with_standing({5, 1, 1}, 0.2).obstruction_of(*eastward), Obstruction::kNone);
+}
+
+TEST(Traffic, TellsWhoPassesFromWhoStands) {
+  const TrajectoryPtr eastward = line({0, 0, 1}, {10, 0, 1});
+
+  EXPECT_EQ(with(line({10, 0, 1}, {0, 0, 1})).obstruction_of(*eastward), Obstruction::kPassing);
+  EXPECT_EQ(with_standing({5, 0.5, 1}).obstruction_of(*eastward), Obstruction::kStanding);
+}
+
+TEST(Traffic, OfManyPlacesWhereSomeoneMayStandTheNearestCounts) {
+  Mover mover;
+  mover.position_m = {0.0, 0.7, 1.0};
+  for (int i = 1; i < 10; ++i) {
+    mover.other_places_m.emplace_back(0.3 * i, 0.7, 1.0);
+  }
+  const Traffic row({mover}, kDistances);
+
+  // Along the row, no nearer than at the start, and across it.
+  EXPECT_EQ(row.obstruction_of(*line({0, 0, 1}, {2, 0, 1})), Obstruction::kNone);
+  EXPECT_EQ(row.obstruction_of(*line({0, 0, 1}, {2, 2, 1})), Obstruction::kStanding);
 }
 
 TEST(Traffic, WhoIsTooNearAlreadyMayLeaveButComeNoNearer) {
   const Traffic beside = with_standing({0.7, 0.0, 1.0});
 
-  EXPECT_FALSE(beside.blocks(*line({0, 0, 1}, {-5, 0, 1})));
-  EXPECT_TRUE(beside.blocks(*line({0, 0, 1}, {0.3, 0, 1})));
+  EXPECT_EQ(beside.obstruction_of(*line({0, 0, 1}, {-5, 0, 1})), Obstruction::kNone);
+  EXPECT_NE(beside.obstruction_of(*line({0, 0, 1}, {0.3, 0, 1})), Obstruction::kNone);
 }
 
 TEST(Traffic, OnlyOneOfTwoGivesWayWhileThereIsTime) {
@@ -104,9 +124,8 @@ TEST(Traffic, WhoStandsNeverGivesWayAndIsAlwaysGivenIt) {
 TEST(Traffic, NobodyIsNoTraffic) {
   const TrajectoryPtr eastward = line({0, 0, 1}, {20, 0, 1});
 
-  EXPECT_FALSE(Traffic().blocks(*eastward));
+  EXPECT_EQ(Traffic().obstruction_of(*eastward), Obstruction::kNone);
   EXPECT_FALSE(Traffic().must_give_way_at(*eastward, Time{}));
-  EXPECT_FALSE(Traffic().is_occupied(Vector3d::Zero(), Time{}));
 }
 
 }  // namespace

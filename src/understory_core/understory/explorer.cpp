@@ -284,8 +284,7 @@ TrajectoryPtr Explorer::try_targets(
         adopt(*target, pilot, now);
         return *flown;
       }
-      is_passing = flown.error() == PlanError::kTraffic &&
-                   !pilot.traffic().is_occupied(target->candidate.viewpoint.position_m, now);
+      is_passing = flown.error() == PlanError::kTraffic;
     }
     // From motion a plan may fail that works from rest; only then is the target to blame.
     if (is_reachable && !is_passing && pilot.is_at_rest(now)) {

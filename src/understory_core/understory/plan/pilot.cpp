@@ -54,9 +54,10 @@ Result<TrajectoryPtr, PlanError> Pilot::fly(const FlightGoal& goal, Time now) {
     ++counters_.failed_plans;
     return planned.error();
   }
-  if (traffic_.blocks(*planned)) {
+  const Obstruction obstruction = traffic_.obstruction_of(*planned);
+  if (obstruction != Obstruction::kNone) {
     ++counters_.traffic_conflicts;
-    return PlanError::kTraffic;
+    return obstruction == Obstruction::kPassing ? PlanError::kTraffic : PlanError::kBarred;
   }
   return accept(std::move(planned).value(), now);
 }

@@ -45,7 +45,6 @@ class Pilot {
   [[nodiscard]] const ClearanceMap& clearance() const { return clearance_; }
   // Who else flies here, as known now.
   void set_traffic(Traffic traffic) { traffic_ = std::move(traffic); }
-  [[nodiscard]] const Traffic& traffic() const { return traffic_; }
 
   // Where a trajectory planned now begins.
   [[nodiscard]] Time next_start(Time now) const { return now + lead_; }

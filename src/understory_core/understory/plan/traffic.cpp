@@ -3,6 +3,7 @@
 #include "understory/plan/traffic.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 namespace understory {
 namespace {
@@ -42,7 +43,7 @@ std::optional<Time> first_meeting(const Path& path, const Mover& mover, double d
   double least_m = distance_m + mover.extra_m;
   for (std::size_t step = 0; step < steps; ++step) {
     const Time time = path.from + static_cast<int>(step) * kStep;
-    const double apart_m = (path.at(step) - mover.position_at(time)).norm();
+    const double apart_m = mover.distance_m(path.at(step), time);
     if (step == 0) {
       least_m = std::min(least_m, apart_m - kJitterM);
     } else if (apart_m < least_m) {
@@ -54,16 +55,31 @@ std::optional<Time> first_meeting(const Path& path, const Mover& mover, double d
 
 }  // namespace
 
-bool Traffic::blocks(const Trajectory& planned) const {
+double Mover::distance_m(const Vector3d& from_m, Time time) const {
+  double squared = (from_m - position_at(time)).squaredNorm();
+  for (const Vector3d& place_m : other_places_m) {
+    squared = std::min(squared, (from_m - place_m).squaredNorm());
+  }
+  return std::sqrt(squared);
+}
+
+Obstruction Traffic::obstruction_of(const Trajectory& planned) const {
   if (movers_.empty()) {
-    return false;
+    return Obstruction::kNone;
   }
   const Path path(planned, planned.start);
-  return std::any_of(movers_.begin(), movers_.end(), [&](const Mover& mover) {
-    const double distance_m =
-        mover.is_at_rest(planned.start) ? distances_.rest_m : distances_.plan_m;
-    return first_meeting(path, mover, distance_m).has_value();
-  });
+  Obstruction found = Obstruction::kNone;
+  for (const Mover& mover : movers_) {
+    const bool is_standing = mover.is_at_rest(planned.start);
+    const double distance_m = is_standing ? distances_.rest_m : distances_.plan_m;
+    if (first_meeting(path, mover, distance_m)) {
+      if (is_standing) {
+        return Obstruction::kStanding;
+      }
+      found = Obstruction::kPassing;
+    }
+  }
+  return found;
 }
 
 std::optional<Time> Traffic::must_give_way_at(const Trajectory& flown, Time now) const {
@@ -84,13 +100,6 @@ std::optional<Time> Traffic::must_give_way_at(const Trajectory& flown, Time now)
     }
   }
   return first;
-}
-
-bool Traffic::is_occupied(const Vector3d& position_m, Time now) const {
-  return std::any_of(movers_.begin(), movers_.end(), [&](const Mover& mover) {
-    return mover.is_at_rest(now) &&
-           (mover.position_at(now) - position_m).norm() < distances_.rest_m + mover.extra_m;
-  });
 }
 
 }  // namespace understory

@@ -15,12 +15,15 @@ namespace understory {
 struct Mover {
   TrajectoryPtr trajectory;  // null: it stays where it is
   Vector3d position_m = Vector3d::Zero();
-  double extra_m = 0.0;  // its place is known no better than this
-  bool has_way = false;  // who meets it gives way
+  std::vector<Vector3d> other_places_m;  // where it may be as well, if it stays
+  double extra_m = 0.0;                  // its place is known no better than this
+  bool has_way = false;                  // who meets it gives way
 
   [[nodiscard]] Vector3d position_at(Time time) const {
     return trajectory ? trajectory->sample(time).position_m : position_m;
   }
+  // From the nearest place where it may be.
+  [[nodiscard]] double distance_m(const Vector3d& from_m, Time time) const;
   [[nodiscard]] bool is_at_rest(Time time) const {
     return trajectory == nullptr || time >= trajectory->end();
   }
@@ -32,20 +35,20 @@ struct TrafficDistances {
   double rest_m = 0.9;     // kept from who stands still: it comes no nearer by itself
 };
 
+enum class Obstruction { kNone, kPassing, kStanding };
+
 class Traffic {
  public:
   Traffic() = default;
   Traffic(std::vector<Mover> movers, const TrafficDistances& distances)
       : movers_(std::move(movers)), distances_(distances) {}
 
-  // Does this trajectory, flown from its start to its end and rested on, come too near to anyone?
+  // Whom does this trajectory, flown from its start to its end and rested on, come too near to?
   // Who is too near already may leave, but come no nearer.
-  [[nodiscard]] bool blocks(const Trajectory& planned) const;
+  [[nodiscard]] Obstruction obstruction_of(const Trajectory& planned) const;
   // When who flies this from `now` on must have given way: to who has way, to who stands still,
   // and to everyone when there is no time left to wait for the other.
   [[nodiscard]] std::optional<Time> must_give_way_at(const Trajectory& flown, Time now) const;
-  // Does someone who stands still bar this place?
-  [[nodiscard]] bool is_occupied(const Vector3d& position_m, Time now) const;
 
  private:
   std::vector<Mover> movers_;

@@ -170,6 +170,8 @@ const char* to_string(PlanError error) {
       return "no safe trajectory";
     case PlanError::kTraffic:
       return "traffic";
+    case PlanError::kBarred:
+      return "someone stands in the way";
     case PlanError::kBudgetSpent:
       return "budget spent";
   }

@@ -56,7 +56,8 @@ enum class PlanError {
   kLimits,
   kUnsafe,
   kBudgetSpent,
-  kTraffic
+  kTraffic,
+  kBarred
 };
 [[nodiscard]] const char* to_string(PlanError error);
 

@@ -32,16 +32,15 @@ Box3d part_of(const Box3d& box_m, int index, int count) {
 }
 
 // Who is silent may have stopped anywhere on its way.
-void append_stops(const Trajectory& flown, Time from, Mover stop, std::vector<Mover>& movers) {
+std::vector<Vector3d> stops_m(const Trajectory& flown, Time from) {
+  std::vector<Vector3d> found{flown.sample(flown.end()).position_m};
   for (Time time = from; time < flown.end(); time += kStopStep) {
     const Vector3d place_m = flown.sample(time).position_m;
-    if ((place_m - movers.back().position_m).norm() > kStopSpacingM) {
-      stop.position_m = place_m;
-      movers.push_back(stop);
+    if ((place_m - found.back()).norm() > kStopSpacingM) {
+      found.push_back(place_m);
     }
   }
-  stop.position_m = flown.sample(flown.end()).position_m;
-  movers.push_back(stop);
+  return found;
 }
 
 }  // namespace
@@ -104,13 +103,14 @@ Traffic traffic_of(const TeamConfig& config, const Peers& peers, Time now) {
     mover.extra_m = peer.in_contact ? 0.0
                                     : std::min(separation.silent_growth_mps * silent_s,
                                                separation.silent_max_m);
+    if (peer.trajectory && silent_s > doubt_s) {
+      mover.other_places_m = stops_m(*peer.trajectory, peer.stated_at);
+    }
     if (!peer.is_on_trajectory() || silent_s > doubt_s) {
       movers.push_back(mover);  // where it is, or was last
     }
-    if (peer.trajectory && silent_s > doubt_s) {
-      append_stops(*peer.trajectory, peer.stated_at, mover, movers);
-    }
     if (peer.trajectory) {
+      mover.other_places_m.clear();
       mover.trajectory = peer.trajectory;
       movers.push_back(mover);
     }
