@@ -193,7 +193,10 @@ class TeamLinkNodelet : public GuardedNodelet {
       }
     }
     const bool all_are_there = in_contact_ == team_.size - 1;
-    return {all_are_there ? DiagnosticStatus::OK : DiagnosticStatus::WARN, contact};
+    if (all_are_there) {
+      return {DiagnosticStatus::OK, contact};
+    }
+    return {DiagnosticStatus::WARN, contact};
   }
 
   team::TeamConfig team_;
