@@ -239,5 +239,13 @@ TEST(Explorer, ObstacleOnTheWayIsAnsweredAtOnceAndSafely) {
   EXPECT_FALSE(flight.pilot.unsafe_from(flight.now).has_value());
 }
 
+TEST(Explorer, RefusesARepulsionWhoseInnerRadiusIsTheOuterOne) {
+  ExplorerConfig config;
+  config.team.coordination.inner_radius_m = config.team.coordination.outer_radius_m;
+  const GridGeometry geometry(0.1, Box3d(Vector3d(0, 0, 0), Vector3d(4, 4, 2)));
+
+  EXPECT_THROW(Explorer(config, geometry), ConfigError);
+}
+
 }  // namespace
 }  // namespace understory

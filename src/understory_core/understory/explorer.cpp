@@ -30,6 +30,9 @@ std::unique_ptr<Strategy> make_strategy(const ExplorerConfig& config,
   const Limits limits = config.limits.limits_for(FlightMode::kCollector);
   const team::TeamConfig& team = config.team;
   const Box3d box_m = geometry.box_m();
+  if (team.coordination.inner_radius_m >= team.coordination.outer_radius_m) {
+    throw ConfigError("team.coordination.inner_radius_m: must lie below outer_radius_m");
+  }
   const TravelRates rates{limits.speed_mps,
                           limits.acceleration_mps2,
                           limits.yaw_rate_radps,
