@@ -21,7 +21,12 @@ from commands import ROOT, cpp_files, our_files, output_of, say
 from results import SuiteResult
 
 COMMANDS = ROOT / "build-test" / "tidy"  # compile_commands.json of all folders in one
-CACHE = pathlib.Path(os.environ.get("UNDERSTORY_TIDY_CACHE", ROOT / "build" / "tidy-cache"))
+# Clones share it, as they share what is compiled (ccache).
+CACHE = (
+    pathlib.Path(os.environ.get("XDG_CACHE_HOME") or pathlib.Path.home() / ".cache")
+    / "understory"
+    / "clang-tidy"
+)
 CLANG_TIDY = "clang-tidy-22"  # leaves out system headers
 # Headers that GCC has precompiled: clang cannot read them, and a file must include what it needs.
 GCC_HEADERS = re.compile(r"-fpch-preprocess|-Winvalid-pch -include \S+/cmake_pch\.hxx")
