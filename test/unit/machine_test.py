@@ -13,6 +13,7 @@ import unittest.mock
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT / "test" / "support"), str(ROOT / "test" / "runner")]
 
+import hil_tests  # noqa: E402
 import machine  # noqa: E402
 import ros_tests  # noqa: E402
 from results import SuiteResult  # noqa: E402
@@ -256,6 +257,36 @@ class TestFiles(unittest.TestCase):
     def test_those_are_files_that_exist(self):
         for name in ros_tests.PATIENT:
             self.assertTrue((ros_tests.FOLDER / f"{name}.test").exists(), name)
+
+
+class HilJobs(unittest.TestCase):
+    """A boot's results, first beside another one."""
+
+    @staticmethod
+    def settled(first, trouble, *alone):
+        runs = iter(alone)
+        with contextlib.redirect_stdout(io.StringIO()):
+            found = hil_tests.settled(first, trouble, lambda: next(runs))
+        assert next(runs, None) is None, "it did not run alone"
+        return found
+
+    def test_a_failure_on_a_slow_machine_counts_if_it_comes_again(self):
+        first = SuiteResult("wire_hil", passed=1, failed=["wire_hil: late"])
+        for second in (
+            SuiteResult("wire_hil", passed=2),
+            SuiteResult("wire_hil", passed=1, failed=["wire_hil: wrong"]),
+        ):
+            self.assertIs(self.settled(first, "it stood still", second), second)
+
+    def test_a_failure_on_a_good_machine_counts(self):
+        first = SuiteResult("wire_hil", failed=["wire_hil: wrong"])
+
+        self.assertIs(self.settled(first, ""), first)
+
+    def test_what_passed_does_not_run_again(self):
+        first = SuiteResult("wire_hil", passed=2)
+
+        self.assertIs(self.settled(first, "it stood still"), first)
 
 
 if __name__ == "__main__":
