@@ -109,9 +109,8 @@ void tell_flight(benchmark::State& state) {
   const auto& tiles = counters.sent[2];
   const auto& states = counters.sent[0];
   state.counters["tiles_known"] = static_cast<double>(known);
-  state.counters["tiles_sent"] = static_cast<double>(tiles.samples);
-  state.counters["bytes_per_tile"] =
-      static_cast<double>(tiles.bytes) / static_cast<double>(tiles.samples);
+  state.counters["blocks_sent"] = static_cast<double>(tiles.samples);
+  state.counters["bytes_of_blocks"] = static_cast<double>(tiles.bytes);
   state.counters["bytes_per_state"] =
       static_cast<double>(states.bytes) / static_cast<double>(states.samples);
 }

@@ -33,8 +33,8 @@ class Pair {
 
   void publish(std::uint64_t version) {
     for (std::uint32_t item = 0; item < kTiles; ++item) {
-      here_.link().publish({{1, SampleKind::kTile, item}, version, test::noise(2000, item)});
-      there_.link().publish({{2, SampleKind::kTile, item}, version, test::noise(2000, item)});
+      here_.link().publish({{1, SampleKind::kTileBlock, item}, version, test::noise(2000, item)});
+      there_.link().publish({{2, SampleKind::kTileBlock, item}, version, test::noise(2000, item)});
     }
   }
   [[nodiscard]] bool has_all(std::uint64_t version) {

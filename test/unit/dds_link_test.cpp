@@ -43,9 +43,9 @@ TEST_F(DdsLinks, WhatOnePublishesTheOtherGets) {
   DdsEnd here(config());
   DdsEnd there(config());
 
-  here.link().publish(sample({3, SampleKind::kTile, 70'000}, 9, {1, 2, 255}));
+  here.link().publish(sample({3, SampleKind::kTileBlock, 70'000}, 9, {1, 2, 255}));
 
-  ASSERT_TRUE(wait_until([&] { return there.has({3, SampleKind::kTile, 70'000}, 9); }));
+  ASSERT_TRUE(wait_until([&] { return there.has({3, SampleKind::kTileBlock, 70'000}, 9); }));
   const std::vector<std::uint8_t> expected = {1, 2, 255};
   EXPECT_EQ(there.samples().begin()->second.payload, expected);
   EXPECT_EQ(there.samples().size(), 1U);
@@ -71,11 +71,11 @@ TEST_F(DdsLinks, TheNewestOfEveryKeyArrivesThoughNobodyTookTheOlder) {
 
   for (std::uint64_t version = 1; version <= 50; ++version) {
     here.link().publish(sample({1, SampleKind::kState, 0}, version));
-    here.link().publish(sample({1, SampleKind::kTile, 7}, 2 * version));
+    here.link().publish(sample({1, SampleKind::kTileBlock, 7}, 2 * version));
   }
 
   EXPECT_TRUE(wait_until([&] { return there.has({1, SampleKind::kState, 0}, 50); }));
-  EXPECT_TRUE(wait_until([&] { return there.has({1, SampleKind::kTile, 7}, 100); }));
+  EXPECT_TRUE(wait_until([&] { return there.has({1, SampleKind::kTileBlock, 7}, 100); }));
   EXPECT_LT(there.link().counters().received, 100U) << "what was superseded must not pile up";
 }
 
@@ -83,7 +83,8 @@ TEST_F(DdsLinks, ALateJoinerGetsTheNewestOfEveryKeyAndNothingOlder) {
   DdsEnd here(config());
   for (std::uint64_t version = 1; version <= 3; ++version) {
     for (std::uint32_t item = 0; item < kTiles; ++item) {
-      here.link().publish(sample({1, SampleKind::kTile, item}, version, test::noise(2000, item)));
+      here.link().publish(
+          sample({1, SampleKind::kTileBlock, item}, version, test::noise(2000, item)));
     }
   }
 
@@ -105,7 +106,7 @@ TEST_F(DdsLinks, OneCallTakesSoManyAtMostAndTheNextTheRest) {
   EXPECT_TRUE(wait_until([&] {
     ++version;
     for (std::uint32_t item = 0; item < kTiles; ++item) {
-      here.link().publish(sample({1, SampleKind::kTile, item}, version));
+      here.link().publish(sample({1, SampleKind::kTileBlock, item}, version));
     }
     std::this_thread::sleep_for(milliseconds(100));  // most have arrived by then
     const std::size_t first = there.link().take().size();
@@ -118,10 +119,11 @@ TEST_F(DdsLinks, ASampleThatIsTooLongStaysHereAndTheLongestArrives) {
   DdsEnd here(config());
   DdsEnd there(config());
 
-  here.link().publish(sample({1, SampleKind::kTile, 1}, 1, test::noise(kMaxPayloadBytes + 1, 1)));
-  here.link().publish(sample({1, SampleKind::kTile, 2}, 1, test::noise(kMaxPayloadBytes, 2)));
+  here.link().publish(
+      sample({1, SampleKind::kTileBlock, 1}, 1, test::noise(kMaxPayloadBytes + 1, 1)));
+  here.link().publish(sample({1, SampleKind::kTileBlock, 2}, 1, test::noise(kMaxPayloadBytes, 2)));
 
-  ASSERT_TRUE(wait_until([&] { return there.has({1, SampleKind::kTile, 2}, 1); }));
+  ASSERT_TRUE(wait_until([&] { return there.has({1, SampleKind::kTileBlock, 2}, 1); }));
   EXPECT_EQ(there.samples().size(), 1U);
   EXPECT_EQ(there.samples().begin()->second.payload, test::noise(kMaxPayloadBytes, 2));
   EXPECT_EQ(here.link().counters().refused, 1U);
@@ -221,18 +223,18 @@ TEST(DdsCut, WhatChangedInAShortCutArrivesAfterItAndNothingElse) {
   DdsEnd here(networks->config());
   DdsEnd there(networks->config(), *networks);
   for (std::uint32_t item = 0; item < kTiles; ++item) {
-    here.link().publish(sample({1, SampleKind::kTile, item}, 1, test::noise(500, item)));
+    here.link().publish(sample({1, SampleKind::kTileBlock, item}, 1, test::noise(500, item)));
   }
   ASSERT_TRUE(wait_until([&] { return there.samples().size() == kTiles; }));
 
   networks->cut();
   for (std::uint64_t version = 2; version <= 20; ++version) {
-    here.link().publish(sample({1, SampleKind::kTile, 7}, version));
+    here.link().publish(sample({1, SampleKind::kTileBlock, 7}, version));
     std::this_thread::sleep_for(milliseconds(50));
   }
   networks->mend();
 
-  EXPECT_TRUE(wait_until([&] { return there.has({1, SampleKind::kTile, 7}, 20); }));
+  EXPECT_TRUE(wait_until([&] { return there.has({1, SampleKind::kTileBlock, 7}, 20); }));
   EXPECT_LE(there.link().counters().received, kTiles + 2) << "what had arrived came again";
 }
 
@@ -247,7 +249,7 @@ TEST(DdsCut, PublishingDoesNotWaitForAVehicleOutOfContact) {
   const auto publish = [&] {
     const auto began = std::chrono::steady_clock::now();
     for (std::uint32_t item = 0; item < 1000; ++item) {  // 4 MB
-      here.link().publish(sample({1, SampleKind::kTile, item}, 1, test::noise(4000, item)));
+      here.link().publish(sample({1, SampleKind::kTileBlock, item}, 1, test::noise(4000, item)));
     }
     return std::chrono::steady_clock::now() - began;
   };

@@ -30,7 +30,7 @@ Sample sample_of(int vehicle, SampleKind kind, std::uint32_t item, std::uint64_t
 }
 
 Sample tile(std::uint32_t item, std::uint64_t version, std::size_t bytes = 936) {
-  Sample sample = sample_of(0, SampleKind::kTile, item, version);
+  Sample sample = sample_of(0, SampleKind::kTileBlock, item, version);
   sample.payload.assign(bytes, static_cast<std::uint8_t>(version));
   return sample;
 }

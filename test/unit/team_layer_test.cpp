@@ -87,13 +87,17 @@ TEST(TeamLayer, IsTheSameAfterCoding) {
     layers.push_back(test::random_layer(geometry(), slot, rng));
   }
 
-  for (const LayerTile& layer : layers) {
-    const std::vector<std::uint8_t> encoded = encode_layer(layer);
-    const std::optional<LayerTile> decoded = decode_layer(encoded.data(), encoded.size());
+  for (std::size_t count = 1; count <= kMostLayers; ++count) {
+    for (std::size_t first = 0; first + count <= layers.size(); ++first) {
+      const auto begin = layers.begin() + static_cast<std::ptrdiff_t>(first);
+      const std::vector<LayerTile> some(begin, begin + static_cast<std::ptrdiff_t>(count));
+      const std::vector<std::uint8_t> encoded = encode_layers(some);
+      const auto decoded = decode_layers(encoded.data(), encoded.size());
 
-    ASSERT_LE(encoded.size(), kMaxLayerBytes);
-    ASSERT_TRUE(decoded.has_value());
-    EXPECT_TRUE(*decoded == layer);
+      ASSERT_LE(encoded.size(), kMaxLayersBytes);
+      ASSERT_TRUE(decoded.has_value());
+      EXPECT_TRUE(*decoded == some);
+    }
   }
 }
 
@@ -101,7 +105,8 @@ TEST(TeamLayer, OfOneStateTakesFewBytes) {
   LayerTile layer;
   layer.maybe_free_rows.fill(0xFFFF);
 
-  EXPECT_LT(encode_layer(layer).size(), 40U);
+  EXPECT_LT(encode_layers({layer}).size(), 40U);
+  EXPECT_LT(encode_layers(std::vector<LayerTile>(kMostLayers, layer)).size(), 45U);
 }
 
 TEST(TeamLayer, DamagedBytesAreNeverAnotherLayer) {
@@ -110,15 +115,15 @@ TEST(TeamLayer, DamagedBytesAreNeverAnotherLayer) {
   for (std::size_t i = 0; i < 600; ++i) {
     layer.set(i, static_cast<VoxelState>(rng.below(4)));
   }
-  const std::vector<std::uint8_t> encoded = encode_layer(layer);
+  const std::vector<std::uint8_t> encoded = encode_layers({layer});
 
   std::size_t believed = 0;
   for (std::size_t byte = 0; byte < encoded.size(); ++byte) {
     for (unsigned bit = 0; bit < 8; ++bit) {
       std::vector<std::uint8_t> damaged = encoded;
       damaged[byte] = static_cast<std::uint8_t>(damaged[byte] ^ (1U << bit));
-      const std::optional<LayerTile> decoded = decode_layer(damaged.data(), damaged.size());
-      believed += decoded && !(*decoded == layer) ? 1U : 0U;
+      const auto decoded = decode_layers(damaged.data(), damaged.size());
+      believed += decoded && !(*decoded == std::vector<LayerTile>{layer}) ? 1U : 0U;
     }
   }
 
@@ -126,16 +131,16 @@ TEST(TeamLayer, DamagedBytesAreNeverAnotherLayer) {
 }
 
 TEST(TeamLayer, BytesThatWereCutOffOrAddedAreNoLayer) {
-  std::vector<std::uint8_t> encoded = encode_layer(LayerTile{});
+  std::vector<std::uint8_t> encoded = encode_layers({LayerTile{}});
 
   for (std::size_t size = 0; size < encoded.size(); ++size) {
-    EXPECT_FALSE(decode_layer(encoded.data(), size).has_value()) << size;
+    EXPECT_FALSE(decode_layers(encoded.data(), size).has_value()) << size;
   }
   std::vector<std::uint8_t> twice = encoded;
   twice.insert(twice.end(), encoded.begin(), encoded.end());
-  EXPECT_FALSE(decode_layer(twice.data(), twice.size()).has_value());
+  EXPECT_FALSE(decode_layers(twice.data(), twice.size()).has_value());
   encoded.push_back(0);
-  EXPECT_FALSE(decode_layer(encoded.data(), encoded.size()).has_value());
+  EXPECT_FALSE(decode_layers(encoded.data(), encoded.size()).has_value());
 }
 
 // Frames of RFC 8878, written by hand: magic number, descriptor, content size, one block of zeros.
@@ -152,7 +157,7 @@ TEST(TeamLayer, ContentOfAnotherSizeIsNoLayer) {
     return frame;
   };
   const auto is_layer = [](const std::vector<std::uint8_t>& frame) {
-    return decode_layer(frame.data(), frame.size()).has_value();
+    return decode_layers(frame.data(), frame.size()).has_value();
   };
 
   EXPECT_TRUE(is_layer(frame_of_zeros(1024, 1024)));
@@ -160,6 +165,8 @@ TEST(TeamLayer, ContentOfAnotherSizeIsNoLayer) {
   EXPECT_FALSE(is_layer(frame_of_zeros(1025, 1025)));
   EXPECT_FALSE(is_layer(frame_of_zeros(1024, 1023)));
   EXPECT_FALSE(is_layer(frame_of_zeros(1024, 60000)));
+  EXPECT_TRUE(is_layer(frame_of_zeros(8192, 8192)));
+  EXPECT_FALSE(is_layer(frame_of_zeros(9216, 9216)));
   EXPECT_FALSE(is_layer(frame_of_zeros(65000, 65000)));
 }
 

@@ -17,7 +17,8 @@ std::size_t index_of(SampleKind kind) {
 }
 
 bool is_known_kind(SampleKind kind) {
-  return kind == SampleKind::kState || kind == SampleKind::kTrajectory || kind == SampleKind::kTile;
+  return kind == SampleKind::kState || kind == SampleKind::kTrajectory ||
+         kind == SampleKind::kTileBlock;
 }
 
 void count(Counters::Traffic& traffic, const Sample& sample) {
@@ -58,7 +59,8 @@ Exchange::Exchange(const TeamConfig& config,
       session_(session),
       geometry_hash_(hash_of(geometry)),
       fused_(config, geometry, sensor_model),
-      outbox_(config.exchange, geometry.slot_count()),
+      blocks_(geometry),
+      outbox_(config.exchange, blocks_.count()),
       sent_layers_(geometry.slot_count()),
       mates_(static_cast<std::size_t>(config.size)) {
   if (session >= kSessionEnd) {
@@ -69,7 +71,7 @@ Exchange::Exchange(const TeamConfig& config,
 MapSnapshotPtr Exchange::on_map(const MapSnapshot& own, Time now) {
   MapSnapshotPtr fused = fused_.update_own(own);
   for (const TileSlot slot : fused_.own_changes()) {
-    outbox_.note_change(slot, now);
+    outbox_.note_change(blocks_.block_of(slot), now);
   }
   return fused;
 }
@@ -110,7 +112,7 @@ std::optional<Rejection> Exchange::refusal_of(const Sample& sample) const {
     return Rejection::kForeignGeometry;
   }
   if (version_of(*header) != sample.version ||
-      (sample.key.kind != SampleKind::kTile && sample.key.item != 0)) {
+      (sample.key.kind != SampleKind::kTileBlock && sample.key.item != 0)) {
     return Rejection::kMalformed;
   }
   return std::nullopt;
@@ -125,8 +127,8 @@ std::optional<Rejection> Exchange::take(const Sample& sample, Time now) {
     const std::optional<TrajectorySample> trajectory = decode_trajectory(sample.payload);
     return trajectory ? take_trajectory(sample, *trajectory) : Rejection::kMalformed;
   }
-  const std::optional<TileSample> tile = decode_tile(sample.payload);
-  return tile ? take_tile(sample, *tile) : Rejection::kMalformed;
+  const std::optional<TileBlockSample> tiles = decode_tile_block(sample.payload);
+  return tiles ? take_tiles(sample, *tiles) : Rejection::kMalformed;
 }
 
 std::optional<Rejection> Exchange::take_state(const Sample& sample,
@@ -166,13 +168,22 @@ std::optional<Rejection> Exchange::take_trajectory(const Sample& sample,
   return is_clock_believed(mate) ? std::nullopt : std::optional(Rejection::kClockOff);
 }
 
-std::optional<Rejection> Exchange::take_tile(const Sample& sample, const TileSample& tile) {
-  if (tile.slot != sample.key.item || tile.slot >= geometry_.slot_count() ||
-      !lies_within(
-          tile.layer, geometry_.tile_of_slot(tile.slot) * kTileVoxels, geometry_.voxels())) {
+std::optional<Rejection> Exchange::take_tiles(const Sample& sample, const TileBlockSample& tiles) {
+  if (tiles.block != sample.key.item || tiles.block >= blocks_.count() ||
+      tiles.layers.size() != blocks_.slots_of(tiles.block).size()) {
     return Rejection::kMalformed;
   }
-  const bool is_new = fused_.accept(sample.key.vehicle, tile.slot, sample.version, tile.layer);
+  const std::vector<TileSlot>& slots = blocks_.slots_of(tiles.block);
+  for (std::size_t i = 0; i < slots.size(); ++i) {
+    const VoxelIndex origin = geometry_.tile_of_slot(slots[i]) * kTileVoxels;
+    if (!lies_within(tiles.layers[i], origin, geometry_.voxels())) {
+      return Rejection::kMalformed;
+    }
+  }
+  bool is_new = false;
+  for (std::size_t i = 0; i < slots.size(); ++i) {
+    is_new |= fused_.accept(sample.key.vehicle, slots[i], sample.version, tiles.layers[i]);
+  }
   return is_new ? std::nullopt : std::optional(Rejection::kStale);
 }
 
@@ -247,21 +258,32 @@ void Exchange::append_trajectory(const OwnState& own, std::vector<Sample>& due) 
 }
 
 void Exchange::append_tiles(Time now, std::vector<Sample>& due) {
-  while (const std::optional<TileSlot> slot = outbox_.next(now)) {
-    const LayerTilePtr& layer = fused_.own_layer(*slot);
-    LayerTilePtr& sent = sent_layers_[*slot];
-    if (sent && *sent == *layer) {
-      continue;  // it has changed back
+  while (const std::optional<BlockIndex> block = outbox_.next(now)) {
+    std::optional<std::vector<LayerTile>> layers = unsent_layers(*block);
+    if (!layers) {
+      continue;  // they have changed back
     }
-    sent = layer;
-    const auto item = static_cast<std::uint32_t>(*slot);
-    const TileSample sample{next_header(), item, *layer};
-    append({static_cast<std::uint8_t>(config_.id), SampleKind::kTile, item},
+    const auto item = static_cast<std::uint32_t>(*block);
+    const TileBlockSample sample{next_header(), item, std::move(*layers)};
+    append({static_cast<std::uint8_t>(config_.id), SampleKind::kTileBlock, item},
            sample.header,
            encode(sample),
            due);
     outbox_.note_sent(due.back().payload.size());
   }
+}
+
+std::optional<std::vector<LayerTile>> Exchange::unsent_layers(BlockIndex block) {
+  std::vector<LayerTile> layers;
+  bool is_new = false;
+  for (const TileSlot slot : blocks_.slots_of(block)) {
+    const LayerTilePtr& own = fused_.own_layer(slot);
+    LayerTilePtr& sent = sent_layers_[slot];
+    is_new |= own && !(sent && *sent == *own);
+    sent = own;
+    layers.push_back(own ? *own : LayerTile{});
+  }
+  return is_new ? std::optional(std::move(layers)) : std::nullopt;
 }
 
 std::vector<Echo> Exchange::echoes(Time now) const {

@@ -19,6 +19,7 @@
 #include "understory/team/peer.hpp"
 #include "understory/team/sample_codec.hpp"
 #include "understory/team/team_config.hpp"
+#include "understory/team/tile_blocks.hpp"
 #include "understory/team/tile_outbox.hpp"
 
 namespace understory::team {
@@ -41,7 +42,7 @@ struct Counters {
     std::uint64_t samples = 0;
     std::uint64_t bytes = 0;  // of payload
   };
-  // By kind: state, trajectory, tile.
+  // By kind: state, trajectory, tile block.
   std::array<Traffic, 3> sent{};
   std::array<Traffic, 3> accepted{};
   std::array<std::uint64_t, kRejectionCount> rejected{};
@@ -102,13 +103,15 @@ class Exchange {
   std::optional<Rejection> take(const Sample& sample, Time now);
   std::optional<Rejection> take_state(const Sample& sample, const StateSample& state, Time now);
   std::optional<Rejection> take_trajectory(const Sample& sample, const TrajectorySample& told);
-  std::optional<Rejection> take_tile(const Sample& sample, const TileSample& tile);
+  std::optional<Rejection> take_tiles(const Sample& sample, const TileBlockSample& tiles);
   [[nodiscard]] bool is_clock_believed(const Mate& mate) const;
   static void map_trajectory(Mate& mate);
 
   void append_state(const OwnState& own, Time now, std::vector<Sample>& due);
   void append_trajectory(const OwnState& own, std::vector<Sample>& due);
   void append_tiles(Time now, std::vector<Sample>& due);
+  // The own layers of a block, if they are others than those sent last.
+  [[nodiscard]] std::optional<std::vector<LayerTile>> unsent_layers(BlockIndex block);
   [[nodiscard]] std::vector<Echo> echoes(Time now) const;
   [[nodiscard]] SampleHeader next_header();
   void append(const SampleKey& key,
@@ -122,8 +125,9 @@ class Exchange {
   std::uint64_t sample_count_ = 0;
   std::uint32_t geometry_hash_;
   FusedMap fused_;
+  TileBlocks blocks_;
   TileOutbox outbox_;
-  std::vector<LayerTilePtr> sent_layers_;
+  std::vector<LayerTilePtr> sent_layers_;  // by slot
   std::optional<Time> next_state_at_;
   std::optional<std::uint64_t> sent_trajectory_id_;
   std::vector<Mate> mates_;  // by id

@@ -173,6 +173,9 @@ bool FusedMap::accept(std::uint8_t vehicle,
     return false;
   }
   known.version = version;
+  if (known.content ? *known.content == layer : layer.is_unknown()) {
+    return true;
+  }
   known.content = std::make_shared<const LayerTile>(layer);
   mark_stale(slot);
   return true;

@@ -3,6 +3,7 @@
 #include "understory/team/layer_tile.hpp"
 
 #include <algorithm>
+#include <cassert>
 
 #include <zstd.h>
 
@@ -11,10 +12,9 @@ namespace {
 
 constexpr std::size_t kPlaneBytes = 2 * kRowsPerTile;
 constexpr std::size_t kRawBytes = 2 * kPlaneBytes;
-constexpr int kCompressionLevel = 19;  // a kilobyte takes no time at any level
+constexpr int kCompressionLevel = 19;  // a few kilobytes take no time at any level
 
 using Rows = std::array<std::uint16_t, kRowsPerTile>;
-using RawLayer = std::array<std::uint8_t, kRawBytes>;
 
 struct FreeCompressor {
   void operator()(ZSTD_CCtx* compressor) const { ZSTD_freeCCtx(compressor); }
@@ -110,32 +110,40 @@ bool lies_within(const LayerTile& layer, const VoxelIndex& tile_origin, const Vo
   return outside_known == 0;
 }
 
-std::vector<std::uint8_t> encode_layer(const LayerTile& layer) {
-  RawLayer raw{};
-  write_rows(layer.maybe_free_rows, raw.data());
-  write_rows(layer.maybe_solid_rows, raw.data() + kPlaneBytes);
+std::vector<std::uint8_t> encode_layers(const std::vector<LayerTile>& layers) {
+  assert(!layers.empty() && layers.size() <= kMostLayers);
+  std::vector<std::uint8_t> raw(layers.size() * kRawBytes);
+  for (std::size_t i = 0; i < layers.size(); ++i) {
+    write_rows(layers[i].maybe_free_rows, &raw[i * kRawBytes]);
+    write_rows(layers[i].maybe_solid_rows, &raw[i * kRawBytes + kPlaneBytes]);
+  }
   const std::unique_ptr<ZSTD_CCtx, FreeCompressor> compressor(ZSTD_createCCtx());
   ZSTD_CCtx_setParameter(compressor.get(), ZSTD_c_compressionLevel, kCompressionLevel);
   ZSTD_CCtx_setParameter(compressor.get(), ZSTD_c_checksumFlag, 1);
-  std::vector<std::uint8_t> encoded(kMaxLayerBytes);
-  static_assert(ZSTD_COMPRESSBOUND(kRawBytes) <= kMaxLayerBytes);
+  std::vector<std::uint8_t> encoded(kMaxLayersBytes);
+  static_assert(ZSTD_COMPRESSBOUND(kMostLayers * kRawBytes) <= kMaxLayersBytes);
   const std::size_t size =
       ZSTD_compress2(compressor.get(), encoded.data(), encoded.size(), raw.data(), raw.size());
   encoded.resize(ZSTD_isError(size) != 0 ? 0 : size);  // cannot be: there is room enough
   return encoded;
 }
 
-std::optional<LayerTile> decode_layer(const std::uint8_t* data, std::size_t size) {
+std::optional<std::vector<LayerTile>> decode_layers(const std::uint8_t* data, std::size_t size) {
   // One frame of exactly that content, nothing after it.
-  if (size > kMaxLayerBytes || ZSTD_getFrameContentSize(data, size) != kRawBytes ||
-      ZSTD_findFrameCompressedSize(data, size) != size) {
+  const std::uint64_t raw_size = ZSTD_getFrameContentSize(data, size);
+  if (size > kMaxLayersBytes || raw_size == 0 || raw_size > kMostLayers * kRawBytes ||
+      raw_size % kRawBytes != 0 || ZSTD_findFrameCompressedSize(data, size) != size) {
     return std::nullopt;
   }
-  RawLayer raw{};
-  if (ZSTD_decompress(raw.data(), raw.size(), data, size) != kRawBytes) {
+  std::vector<std::uint8_t> raw(raw_size);
+  if (ZSTD_decompress(raw.data(), raw.size(), data, size) != raw_size) {
     return std::nullopt;
   }
-  return LayerTile{read_rows(raw.data()), read_rows(raw.data() + kPlaneBytes)};
+  std::vector<LayerTile> layers;
+  for (std::size_t at = 0; at < raw_size; at += kRawBytes) {
+    layers.push_back({read_rows(&raw[at]), read_rows(&raw[at + kPlaneBytes])});
+  }
+  return layers;
 }
 
 }  // namespace understory::team

@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
 // What one vehicle's own observations say of a tile: the state of each of its 16^3 voxels, two bits
-// each, laid out as in Tile. A value. Encoded it is compressed and carries a checksum; decoding
-// takes any bytes and returns a layer or nothing.
+// each, laid out as in Tile. A value. Several are encoded together, compressed and with a checksum;
+// decoding takes any bytes and returns layers or nothing.
 #pragma once
 
 #include <array>
@@ -41,9 +41,12 @@ using LayerTilePtr = std::shared_ptr<const LayerTile>;
                                const VoxelIndex& tile_origin,
                                const VoxelBox& voxels);
 
-inline constexpr std::size_t kMaxLayerBytes = 1200;  // encoded; 1024 that do not compress take less
+inline constexpr std::size_t kMostLayers = 8;         // encoded together
+inline constexpr std::size_t kMaxLayersBytes = 8400;  // that do not compress take less
 
-[[nodiscard]] std::vector<std::uint8_t> encode_layer(const LayerTile& layer);
-[[nodiscard]] std::optional<LayerTile> decode_layer(const std::uint8_t* data, std::size_t size);
+// Of 1 to kMostLayers.
+[[nodiscard]] std::vector<std::uint8_t> encode_layers(const std::vector<LayerTile>& layers);
+[[nodiscard]] std::optional<std::vector<LayerTile>> decode_layers(const std::uint8_t* data,
+                                                                  std::size_t size);
 
 }  // namespace understory::team

@@ -13,12 +13,12 @@
 
 namespace understory::team {
 
-enum class SampleKind : std::uint8_t { kState = 1, kTrajectory = 2, kTile = 3 };
+enum class SampleKind : std::uint8_t { kState = 1, kTrajectory = 2, kTileBlock = 3 };
 
 struct SampleKey {
   std::uint8_t vehicle = 0;  // who made it, 0 .. 254
   SampleKind kind = SampleKind::kState;
-  std::uint32_t item = 0;  // of a tile: its slot; else 0
+  std::uint32_t item = 0;  // of a tile block: its index; else 0
 
   friend bool operator<(const SampleKey& a, const SampleKey& b) {
     return std::tie(a.vehicle, a.kind, a.item) < std::tie(b.vehicle, b.kind, b.item);

@@ -196,8 +196,8 @@ std::size_t max_payload_bytes(SampleKind kind) {
       return 2048;
     case SampleKind::kTrajectory:
       return 60000;
-    case SampleKind::kTile:
-      return kMaxLayerBytes + 100;
+    case SampleKind::kTileBlock:
+      return kMaxLayersBytes + 100;
   }
   return 0;
 }
@@ -251,12 +251,12 @@ Encoded encode(const TrajectorySample& sample) {
   return serialised(message);
 }
 
-Encoded encode(const TileSample& sample) {
-  wire::Tile message;
+Encoded encode(const TileBlockSample& sample) {
+  wire::TileBlock message;
   write(sample.header, *message.mutable_header());
-  message.set_slot(sample.slot);
-  const std::vector<std::uint8_t> layer = encode_layer(sample.layer);
-  message.set_layer(layer.data(), layer.size());
+  message.set_block(sample.block);
+  const std::vector<std::uint8_t> layers = encode_layers(sample.layers);
+  message.set_layers(layers.data(), layers.size());
   return serialised(message);
 }
 
@@ -321,19 +321,19 @@ std::optional<TrajectorySample> decode_trajectory(const Encoded& payload) {
   return sample;
 }
 
-std::optional<TileSample> decode_tile(const Encoded& payload) {
-  const auto message = parsed<wire::Tile>(payload);
+std::optional<TileBlockSample> decode_tile_block(const Encoded& payload) {
+  const auto message = parsed<wire::TileBlock>(payload);
   if (!message) {
     return std::nullopt;
   }
   const auto header = header_of(*message);
   // NOLINTNEXTLINE(cppcoreguidelines-pro-type-reinterpret-cast): protobuf holds bytes as characters
-  const auto* bytes = reinterpret_cast<const std::uint8_t*>(message->layer().data());
-  const auto layer = decode_layer(bytes, message->layer().size());
-  if (!header || !layer) {
+  const auto* bytes = reinterpret_cast<const std::uint8_t*>(message->layers().data());
+  auto layers = decode_layers(bytes, message->layers().size());
+  if (!header || !layers) {
     return std::nullopt;
   }
-  return TileSample{*header, message->slot(), *layer};
+  return TileBlockSample{*header, message->block(), std::move(*layers)};
 }
 
 }  // namespace understory::team

@@ -19,7 +19,7 @@
 
 namespace understory::team {
 
-inline constexpr std::uint32_t kProtocolVersion = 1;
+inline constexpr std::uint32_t kProtocolVersion = 2;
 inline constexpr std::size_t kMaxTeam = 32;
 
 using Encoded = std::vector<std::uint8_t>;
@@ -65,10 +65,10 @@ struct TrajectorySample {
   Trajectory trajectory;  // its limits are not told
 };
 
-struct TileSample {
+struct TileBlockSample {
   SampleHeader header;
-  std::uint32_t slot = 0;
-  LayerTile layer;
+  std::uint32_t block = 0;        // see TileBlocks
+  std::vector<LayerTile> layers;  // of its tiles
 };
 
 [[nodiscard]] std::uint32_t hash_of(const GridGeometry& geometry);
@@ -77,12 +77,12 @@ struct TileSample {
 
 [[nodiscard]] Encoded encode(const StateSample& sample);
 [[nodiscard]] Encoded encode(const TrajectorySample& sample);
-[[nodiscard]] Encoded encode(const TileSample& sample);
+[[nodiscard]] Encoded encode(const TileBlockSample& sample);
 
 // The header alone, of any kind of sample: the rest need not be of this protocol.
 [[nodiscard]] std::optional<SampleHeader> decode_header(const Encoded& payload);
 [[nodiscard]] std::optional<StateSample> decode_state(const Encoded& payload);
 [[nodiscard]] std::optional<TrajectorySample> decode_trajectory(const Encoded& payload);
-[[nodiscard]] std::optional<TileSample> decode_tile(const Encoded& payload);
+[[nodiscard]] std::optional<TileBlockSample> decode_tile_block(const Encoded& payload);
 
 }  // namespace understory::team

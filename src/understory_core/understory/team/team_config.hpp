@@ -13,7 +13,7 @@ struct ExchangeConfig {
   double state_rate_hz = 5.0;
   double tile_settle_s = 2.0;
   double tile_max_wait_s = 10.0;
-  double tile_rate_bytes_per_s = 12000.0;
+  double tile_rate_bytes_per_s = 8000.0;
   double contact_timeout_s = 2.0;
   double max_clock_offset_s = 0.2;
 
@@ -22,7 +22,7 @@ struct ExchangeConfig {
     f.field("tile_settle_s",
             tile_settle_s,
             in_range(0.0, 60.0),
-            "a tile is sent once it has not changed for so long");
+            "a block of tiles is sent once it has not changed for so long");
     f.field("tile_max_wait_s",
             tile_max_wait_s,
             in_range(0.1, 600.0),

@@ -11,24 +11,24 @@ constexpr double kBucket_s = 1.0;
 
 }  // namespace
 
-TileOutbox::TileOutbox(const ExchangeConfig& config, std::size_t slot_count)
+TileOutbox::TileOutbox(const ExchangeConfig& config, std::size_t block_count)
     : settle_(duration_from_seconds(config.tile_settle_s)),
       max_wait_(duration_from_seconds(config.tile_max_wait_s)),
       rate_bytes_per_s_(config.tile_rate_bytes_per_s),
       budget_bytes_(kBucket_s * config.tile_rate_bytes_per_s),
-      changes_(slot_count) {}
+      changes_(block_count) {}
 
-void TileOutbox::note_change(TileSlot slot, Time now) {
-  std::optional<Change>& change = changes_[slot];
+void TileOutbox::note_change(BlockIndex block, Time now) {
+  std::optional<Change>& change = changes_[block];
   if (change) {
     change->last = now;
   } else {
     change = Change{now, now};
-    waiting_.emplace(now, slot);
+    waiting_.emplace(now, block);
   }
 }
 
-std::optional<TileSlot> TileOutbox::next(Time now) {
+std::optional<BlockIndex> TileOutbox::next(Time now) {
   refill(now);
   if (budget_bytes_ <= 0.0) {
     return std::nullopt;
@@ -39,10 +39,10 @@ std::optional<TileSlot> TileOutbox::next(Time now) {
   if (found == waiting_.end()) {
     return std::nullopt;
   }
-  const TileSlot slot = found->second;
+  const BlockIndex block = found->second;
   waiting_.erase(found);
-  changes_[slot].reset();
-  return slot;
+  changes_[block].reset();
+  return block;
 }
 
 void TileOutbox::note_sent(std::size_t bytes) {

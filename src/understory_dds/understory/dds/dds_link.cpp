@@ -107,7 +107,7 @@ Endpoints create_endpoints(dds_entity_t domain) {
 bool is_well_formed(const understory_dds_TeamSample& sample) {
   return sample.vehicle != kNobody && sample.payload._length <= kMaxPayloadBytes &&
          sample.kind >= static_cast<std::uint8_t>(team::SampleKind::kState) &&
-         sample.kind <= static_cast<std::uint8_t>(team::SampleKind::kTile);
+         sample.kind <= static_cast<std::uint8_t>(team::SampleKind::kTileBlock);
 }
 
 team::Sample to_sample(const understory_dds_TeamSample& from) {
