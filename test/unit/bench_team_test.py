@@ -53,6 +53,10 @@ class Teams(unittest.TestCase):
         self.assertEqual(row["sent_bytes_per_s"], "1100.0")
         self.assertEqual(row["sent_peak_bytes"], "12000")
 
+    def test_overlap_is_what_was_seen_more_than_once(self):
+        self.assertEqual(self.row(explored_volume_m3=7200.0)["overlap"], "0.25")
+        self.assertEqual(self.row(team=[])["overlap"], "")
+
     def test_after_the_end_there_is_as_much_as_at_the_end(self):
         row = self.row()
         self.assertEqual(row["volume_300_s"], "5000.0")
@@ -69,7 +73,8 @@ class Teams(unittest.TestCase):
         lines = team_rows.markdown(grouped(rows)).splitlines()
         self.assertEqual(len(lines), 3)
         cells = [cell.strip() for cell in lines[2].split("|")][1:-1]
-        self.assertEqual(cells[:5], ["t", "explorer_collector", "2", "0.80 / 0.80", "1.75"])
+        self.assertEqual(cells[:5], ["t", "explorer_collector", "2", "0.80 / 0.80", "0.00"])
+        self.assertEqual(cells[5], "1.75")
         self.assertEqual(team_rows.markdown(grouped(rows[1:])), "")
 
     def test_a_mission_over_in_time_is_good_only_where_that_is_wanted(self):

@@ -6,7 +6,8 @@ import statistics
 
 VOLUME_TIMES_S = (300, 600, 900, 1200, 1500)
 VOLUMES = [f"volume_{time_s}_s" for time_s in VOLUME_TIMES_S]
-MEASURED = ["team_size", "least_separation_m", "balance", "sent_bytes_per_s", "sent_peak_bytes"]
+MEASURED = ["team_size", "least_separation_m", "balance", "overlap"]
+MEASURED += ["sent_bytes_per_s", "sent_peak_bytes"]
 COLUMNS = MEASURED + VOLUMES
 
 
@@ -28,6 +29,9 @@ def measured(result):
         seen = [mate["seen_volume_m3"] for mate in mates]
         # 1: all have seen as much.
         values["balance"] = min(seen) / max(seen) if max(seen) > 0 else None
+        # 0: nobody has seen what another one has seen; 1: two have seen everything.
+        united = result.get("explored_volume_m3")
+        values["overlap"] = sum(seen) / united - 1.0 if united else None
         values["sent_bytes_per_s"] = max(mate["bytes_per_s"] for mate in mates)
         values["sent_peak_bytes"] = max(mate["peak_bytes_per_s"] for mate in mates)
     return {name: values.get(name) for name in COLUMNS}
@@ -54,15 +58,15 @@ def markdown(groups):
         return ""
     times = " | ".join(f"m3 at {time_s} s" for time_s in VOLUME_TIMES_S)
     lines = [
-        f"| scene | strategy | vehicles | balance, mean / least | least separation m "
+        f"| scene | strategy | vehicles | balance, mean / least | overlap | least separation m "
         f"| sent B/s | peak B in 1 s | {times} |",
-        "|" + "---|" * (7 + len(VOLUMES)),
+        "|" + "---|" * (8 + len(VOLUMES)),
     ]
     for (title, _, strategy), rows in groups.items():
         balance = f"{_mean(rows, 'balance', 2)} / {_worst(rows, 'balance', min, 2)}"
         cells = [title, strategy, rows[0]["team_size"], balance]
-        cells += [_worst(rows, "least_separation_m", min, 2), _mean(rows, "sent_bytes_per_s", 0)]
-        cells += [_worst(rows, "sent_peak_bytes", max, 0)]
+        cells += [_mean(rows, "overlap", 2), _worst(rows, "least_separation_m", min, 2)]
+        cells += [_mean(rows, "sent_bytes_per_s", 0), _worst(rows, "sent_peak_bytes", max, 0)]
         cells += [_mean(rows, name, 0) for name in VOLUMES]
         lines.append("| " + " | ".join(cells) + " |")
     return "\n".join(lines) + "\n"
