@@ -26,7 +26,15 @@ class AWire(unittest.TestCase):
         self.assertGreater(sum(gaps), 0.95 * FRAME_TIME_S * len(gaps))
         self.assertLess(statistics.median(gaps), 4 * FRAME_TIME_S)
 
+    def replace_qdisc(self, words):
+        before = f"dev {BUS} root netem rate 1mbit limit {QUEUE}".split()
+        must_run("tc", "qdisc", "replace", "dev", BUS, "root", "netem", *words.split())
+        self.addCleanup(must_run, "tc", "qdisc", "replace", *before)
+
     def test_refuses_frames_once_its_queue_is_full(self):
+        self.assertIn(f"limit {QUEUE} rate 1Mbit", must_run("tc", "qdisc", "show", "dev", BUS))
+        self.replace_qdisc(f"limit {QUEUE} rate 100kbit")  # we may not be as fast as a wire
+
         with Port() as sender, self.assertRaises(OSError) as caught:
             for _ in range(50 * QUEUE):
                 sender.send(Frame(0x100, bytes(8)))
@@ -34,10 +42,7 @@ class AWire(unittest.TestCase):
         self.assertEqual(caught.exception.errno, errno.ENOBUFS)
 
     def test_confirms_a_frame_only_when_it_was_sent(self):
-        slow = f"dev {BUS} root netem delay 100ms limit {QUEUE}".split()
-        before = f"dev {BUS} root netem rate 1mbit limit {QUEUE}".split()
-        must_run("tc", "qdisc", "replace", *slow)
-        self.addCleanup(must_run, "tc", "qdisc", "replace", *before)
+        self.replace_qdisc(f"delay 100ms limit {QUEUE}")
         with Port(own_frames=True) as port:
             began = time.monotonic()
             port.send(Frame(0x100, b"\x01"))
