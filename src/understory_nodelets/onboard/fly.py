@@ -4,7 +4,8 @@
 """Flies a mission in real time: a CAN bus, a vehicle on it, a ROS master, the onboard process with
 its live line, the report.
 
-Without --bus it runs itself again with a bus of its own (hil/provider).
+Without --bus it runs itself again with a bus of its own (hil/provider); of a team each vehicle on
+one of its own kernel, if a kernel must be booted for it.
 Exit status: that of the onboard process (0 completed without collision, 1 not so, 2 wrong use).
 """
 
@@ -28,6 +29,7 @@ STOP_PATIENCE_S = 30.0
 VEHICLE_PATIENCE_S = 1.0  # to find fault with its options and its bus
 MEMORY = "memory"
 OWN_BUS = "vcan0"
+PROCESSORS_PER_KERNEL = 2  # each needs one for itself, and the host another
 MOST_VEHICLES = 10  # that find each other on one machine
 PROVIDER = Path(__file__).resolve().parents[3] / "hil/provider/hil.py"
 PASSED_ON = ("forest", "crop", "strategy", "speed-cap", "resume")
@@ -184,6 +186,58 @@ def with_own_bus(words: List[str], buses: int) -> NoReturn:
     os.execv(command[0], command)
 
 
+def quickest_provider() -> str:
+    """The one that will be taken; empty if none works here."""
+    outcome = subprocess.run(
+        ["/usr/bin/python3", "-B", str(PROVIDER), "--list"],
+        stdin=subprocess.DEVNULL,
+        capture_output=True,
+        encoding="utf-8",
+        check=False,
+    )
+    lines = [line.split(maxsplit=1) for line in outcome.stdout.splitlines()]
+    return next((words[0] for words in lines if words[1:] == ["works"]), "")
+
+
+def boots_kernels(arguments: argparse.Namespace) -> bool:
+    """Whether each vehicle of the team gets a kernel. Where the machine is too small for that, all
+    vehicles are within their processes."""
+    if arguments.bus is not None or arguments.team == 1 or quickest_provider() != "uml":
+        return False
+    processors = os.cpu_count() or 1
+    if processors >= PROCESSORS_PER_KERNEL * arguments.team:
+        return True
+    print(
+        f"understory fly: this kernel has no CAN, and {processors} processors are too few to boot "
+        f"{arguments.team} that have: --bus memory",
+        file=sys.stderr,
+    )
+    arguments.bus = MEMORY
+    return False
+
+
+def words_of(arguments: argparse.Namespace) -> List[str]:
+    """The command line that makes these arguments."""
+    words: List[str] = []
+    for name, value in vars(arguments).items():
+        option = f"--{name.replace('_', '-')}"
+        if value is True:
+            words.append(option)
+        elif isinstance(value, list):
+            words += [word for one in value for word in (option, one)]
+        elif value not in (None, False, ""):
+            words += [option, str(value)]
+    return words
+
+
+def booted_command(arguments: argparse.Namespace, folder: Path, network: str) -> List[str]:
+    """Flies one vehicle of a team in a kernel of its own."""
+    arguments.team, arguments.kill = 1, []
+    arguments.bus, arguments.out, arguments.no_report = OWN_BUS, str(folder), True
+    command = ["/usr/bin/python3", "-B", str(PROVIDER), "--network", network, "--"]
+    return command + ["/usr/bin/python3", str(Path(__file__).resolve()), *words_of(arguments)]
+
+
 def stop(process: subprocess.Popen) -> None:
     if process.poll() is None:
         process.terminate()
@@ -263,7 +317,7 @@ def check_team(arguments: argparse.Namespace) -> None:
         raise FlyError(str(error)) from error
 
 
-def fly(arguments: argparse.Namespace) -> int:
+def fly(arguments: argparse.Namespace, boots: bool = False) -> int:
     team = f"_team{arguments.team}" if arguments.team > 1 else ""
     name = f"{Path(arguments.scenario).stem}_{arguments.seed}{team}_onboard"
     folder = Path(arguments.out or Path("results") / name).resolve()
@@ -272,7 +326,7 @@ def fly(arguments: argparse.Namespace) -> int:
     except OSError as error:
         raise FlyError(f"{folder}: cannot be made: {error.strerror}") from error
     if arguments.team > 1:
-        return fly_team.fly_team(arguments, folder, sys.modules[__name__])
+        return fly_team.fly_team(arguments, folder, sys.modules[__name__], boots)
     command = onboard_command(arguments, folder)
     master, uri = None, arguments.master or os.environ.get("ROS_MASTER_URI", "")
     if arguments.master and not is_master(arguments.master):
@@ -300,9 +354,10 @@ def main() -> int:
     arguments = parse_arguments(sys.argv[1:])
     try:
         check_team(arguments)
-        if arguments.bus is None:
+        boots = boots_kernels(arguments)
+        if arguments.bus is None and not boots:
             with_own_bus(sys.argv[1:], arguments.team)
-        return fly(arguments)
+        return fly(arguments, boots)
     except FlyError as error:
         print(f"understory fly: {error}", file=sys.stderr)
         return 2
