@@ -24,7 +24,6 @@ FOLDER = ROOT / "hil" / "test"
 RESULTS = ROOT / "build-test" / "hil"
 RUNNER = FOLDER / "run_hil.py"
 FROM_HOST = FOLDER / "from_host.py"
-TEAM = FOLDER / "team_from_host.py"  # boots two kernels, so it has the machine for itself
 PORT_TEST = "hil_port_test"
 AT_ONCE = max(1, (os.cpu_count() or 1) // 2)
 # Tests have time limits of their own; this is for what hangs as a whole. The first signal lets
@@ -60,14 +59,11 @@ def why_no_bus():
     return None if outcome.returncode == 0 else f"no bus here: {reason or outcome.stderr}"
 
 
-def from_host(path, folder):
-    report = folder / path.stem / f"{path.stem}.xml"
-    return with_timeout([sys.executable, "-B", RUNNER, "--out", report, path])
-
-
 def jobs(folder, build_folder):
     """{name: command}; each writes its JUnit report to folder/NAME/NAME.xml."""
-    found = {FROM_HOST.stem: from_host(FROM_HOST, folder)}  # first, since it takes longest
+    report = folder / FROM_HOST.stem / f"{FROM_HOST.stem}.xml"
+    from_host = [sys.executable, "-B", RUNNER, "--out", report, FROM_HOST]
+    found = {FROM_HOST.stem: with_timeout(from_host)}  # first, since it takes longest
     for path in test_modules():
         report = ["--out", folder / path.stem / f"{path.stem}.xml"]
         found[path.stem] = with_bus(hil_options(path), [RUNNER, *report, path])
@@ -142,11 +138,7 @@ def run_hil_tests(build_folder=None):
         for run in concurrent.futures.as_completed(runs):
             done[runs[run]] = run.result()
             show_job(runs[run], done[runs[run]][0], folder)
-    done[TEAM.stem] = run_job(TEAM.stem, from_host(TEAM, folder), folder)
-    show_job(TEAM.stem, done[TEAM.stem][0], folder)
-    alone = folder / "alone"
-    commands = {**jobs(alone, build_folder), TEAM.stem: from_host(TEAM, alone)}
-    add_settled(done, commands, alone, result)
+    add_settled(done, jobs(folder / "alone", build_folder), folder / "alone", result)
     if not result.failed:
         shutil.rmtree(folder)
     result.duration_s = time.monotonic() - began
