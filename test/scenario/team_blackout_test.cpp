@@ -14,7 +14,7 @@ namespace understory {
 namespace {
 
 constexpr double kBlackout_s = 300.0;
-constexpr double kFrame_s = 1.0 / 15.0;
+constexpr int kFramesPerSecond = 15;
 constexpr std::uint64_t kSession = 1'790'000'000'000'000;
 
 SimulationConfig scene() {
@@ -77,7 +77,10 @@ TEST(TeamBlackout, OfFiveMinutesIsMadeUpForWithinTwoSecondsOfContact) {
   // What they tell each other waits for them long before there is contact.
   double same_at_s = 0.0;
   const std::vector<Vector3d> places_m{{0.0, 0.0, 1.0}, {5.0, 0.0, 1.0}};
-  for (double now_s = 0.9 * kBlackout_s; now_s < kBlackout_s + 10.0; now_s += kFrame_s) {
+  constexpr int kFirst = static_cast<int>(0.9 * kBlackout_s) * kFramesPerSecond;
+  constexpr int kEnd = static_cast<int>(kBlackout_s + 10.0) * kFramesPerSecond;
+  for (int frame = kFirst; frame < kEnd; ++frame) {
+    const double now_s = static_cast<double>(frame) / kFramesPerSecond;
     const Time now(duration_from_seconds(now_s));
     radio.advance(now, places_m);
     const MapSnapshotPtr a = stations[0].talk(now);

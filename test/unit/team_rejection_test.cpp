@@ -144,7 +144,7 @@ TEST(TeamRejection, RejectsWhatIsRepeatedOrSuperseded) {
 }
 
 TEST(TeamRejection, RejectsASessionThatDoesNotFitAVersion) {
-  EXPECT_THROW(exchange_of(0, std::uint64_t{1} << 51U), ConfigError);
+  EXPECT_THROW((void)exchange_of(0, std::uint64_t{1} << 51U), ConfigError);
 }
 
 // Real samples, altered bit by bit, cut, extended and spliced, most with a version that fits.
