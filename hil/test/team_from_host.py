@@ -12,6 +12,7 @@ import signal
 import subprocess
 import sys
 import tempfile
+import unittest
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -28,6 +29,7 @@ SAFETY_DISTANCE_M = 0.8
 LEAST_FRAMES = 1000
 
 
+@unittest.skipIf((os.cpu_count() or 1) < 4, "it takes four processors")
 class ATeam(PatientTest):
     def fly(self, *options):
         """Its exit status, and both vehicles."""

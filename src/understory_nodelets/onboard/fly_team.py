@@ -7,6 +7,7 @@ for a bus, each vehicle has a kernel, and DDS goes over an Ethernet between them
 
 import argparse
 import bisect
+import contextlib
 import copy
 import csv
 import json
@@ -118,7 +119,8 @@ class Mate:
         self.is_killed = True
         if self.is_booted and self.is_running() and self.onboard is not None:
             team_network.kill_children(self.onboard.pid)
-            self.onboard.wait(KERNEL_PATIENCE_S)
+            with contextlib.suppress(subprocess.TimeoutExpired):
+                self.onboard.wait(KERNEL_PATIENCE_S)
         for process in [self.onboard, *self.helpers]:
             if process is not None and process.poll() is None:
                 process.kill()

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """An Ethernet between kernels that run as processes of one machine: a socket for each, and a hub."""
 
+import contextlib
 import os
 import selectors
 import signal
@@ -18,7 +19,8 @@ def kill_children(pid: int) -> None:
     """Of this process, each with its whole group."""
     children = Path(f"/proc/{pid}/task/{pid}/children").read_text(encoding="ascii").split()
     for child in map(int, children):
-        os.killpg(child, signal.SIGKILL)
+        with contextlib.suppress(ProcessLookupError):  # it has just ended
+            os.killpg(child, signal.SIGKILL)
 
 
 class Ethernet:
@@ -72,7 +74,5 @@ class Ethernet:
             return
         for end in self._ours:
             if end is not source:
-                try:
+                with contextlib.suppress(OSError):
                     end.send(frame)
-                except OSError:
-                    pass
