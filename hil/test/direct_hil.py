@@ -2,12 +2,13 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Direct mode: the host commands the motors itself, and its silence stops them."""
 
+import contextlib
 import threading
 import time
 import unittest
 from typing import Any, Tuple
 
-from bench import PROTOCOL_HASH, VERSION, FlightTest, Listener, arm_token, encode
+from bench import PROTOCOL_HASH, VERSION, FlightTest, Listener, Said, arm_token, encode
 from can_tools import Frame, Port
 
 PERIOD_S = 0.0025
@@ -15,6 +16,10 @@ ZERO_S, DISARM_S = 0.1, 1.0
 SESSION = 4711
 IDLE = 800  # 20 %: the motors turn, and the launcher still holds it
 BY_NUMBER = {"ARM_CMD": 0x20, "ESC_CMD": 0x30, "HOST_HB": 0x400}
+
+
+def is_turning(said: Said) -> bool:
+    return said["EscRpm0"] > 1000
 
 
 class Sender:
@@ -76,9 +81,20 @@ class DirectMode(FlightTest):
         sender = self.sender()
         armed = self.bus.wait_for_state("ARMED")
         self.assertEqual(armed["FlagDirect"], 1)
-        sender.throttle = IDLE
-        self.bus.wait_for("ESC_RPM", lambda said: said["EscRpm0"] > 1000)
+        self.spin_up(sender)
         return sender, armed.stamp_s
+
+    def spin_up(self, sender: Sender) -> None:
+        """Where the sender was late, that was a silence, after which motors start from zero only."""
+        for _ in range(2):
+            sender.throttle = IDLE
+            with contextlib.suppress(AssertionError):
+                self.bus.wait_for("ESC_RPM", is_turning, 2.0)
+                return
+            sender.throttle = 0
+            time.sleep(2 * ZERO_S)
+        sender.throttle = IDLE
+        self.bus.wait_for("ESC_RPM", is_turning)
 
     def setUp(self) -> None:
         super().setUp()
@@ -111,7 +127,7 @@ class DirectMode(FlightTest):
         sender.throttle = IDLE
 
         self.assertLess(still, 500)
-        self.bus.wait_for("ESC_RPM", lambda said: said["EscRpm0"] > 1000, 2.0, time.time())
+        self.bus.wait_for("ESC_RPM", is_turning, 2.0, time.time())
 
     def test_throttle_that_is_not_zero_arms_nothing(self) -> None:
         self.start_vehicle("--direct")

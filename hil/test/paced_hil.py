@@ -4,6 +4,7 @@
 
 import contextlib
 import re
+import subprocess
 import tempfile
 import threading
 import time
@@ -11,7 +12,7 @@ import unittest
 from pathlib import Path
 
 from bench import HOST_BUS, MEMORY, FlightTest, summary_of
-from can_tools import BUS, Frame, Port, must_run
+from can_tools import BUS, Frame, Port
 
 HIL_OPTIONS = ["--wire"]
 BITRATE, QUEUE = 1_000_000, 10
@@ -66,21 +67,29 @@ class ASlowBus(FlightTest):
         self.assertEqual(states[-1], ("ARMED", "NONE"))
 
     def burst(self) -> None:
-        """Another station fills the queue, with frames that stay in it for BURST_S."""
-        stay = f"delay {1e3 * BURST_S:.0f}ms"
-        with Port() as port:
+        """Now and then frames stay in the queue for BURST_S, and another station fills it. It sends
+        already when that begins: where host and vehicle come first they wait with two frames each
+        in a queue that never fills."""
+        with Port() as port, self.run_tc() as tc:
             while not self.is_ending:
-                self.shape(stay)
-                with contextlib.suppress(OSError):  # full
-                    while True:
+                self.shape(tc, f"delay {1e3 * BURST_S:.0f}ms")
+                end_s = time.monotonic() + 2 * BURST_S
+                while time.monotonic() < end_s:
+                    with contextlib.suppress(OSError):  # full
                         port.send(Frame(0x7FF, bytes(8)))
-                time.sleep(BURST_S)
-                self.shape(f"rate {BITRATE}bit")
+                self.shape(tc, f"rate {BITRATE}bit")
                 time.sleep(PAUSE_S)
 
     @staticmethod
-    def shape(netem: str) -> None:
-        must_run(*f"tc qdisc replace dev {BUS} root netem {netem} limit {QUEUE}".split())
+    def run_tc() -> "subprocess.Popen[str]":
+        """Obeys line by line: starting it takes longer than the queue takes to fill."""
+        return subprocess.Popen(["tc", "-batch", "-"], stdin=subprocess.PIPE, encoding="utf-8")
+
+    @staticmethod
+    def shape(tc: "subprocess.Popen[str]", netem: str) -> None:
+        assert tc.stdin is not None
+        tc.stdin.write(f"qdisc replace dev {BUS} root netem {netem} limit {QUEUE}\n")
+        tc.stdin.flush()
 
 
 if __name__ == "__main__":

@@ -113,7 +113,9 @@ class SilenceOfTheVehicle(WireTest):
 
         begin_s = self.bus.of("ODO_RATE")[-1].stamp_s
         # A landing vehicle no longer reports standstills by what this end hears of odometry.
-        hold = next(said for said in self.commits(begin_s) if said["SpMode"] == "HOLD")
+        hold = self.bus.wait_for(
+            "SP_COMMIT", lambda said: said["SpMode"] == "HOLD", 0.0, begin_s
+        )
         self.assert_after(ODOMETRY_S, begin_s, hold, "setpoints HOLD", TORN_S)
         self.assert_link_lost(begin_s)
         self.assertEqual(self.sessions(), [before[0], before[0] + 1])

@@ -3,6 +3,7 @@
 """Builds for the tests and runs of their ctest entries."""
 
 import collections
+import concurrent.futures
 import json
 import os
 import re
@@ -11,6 +12,7 @@ import time
 import xml.etree.ElementTree
 
 from commands import JOBS, ROOT, output_of, run_logged, say, show_log
+from junit import count_report
 from results import SuiteResult
 
 CHECKED = ["-DCMAKE_BUILD_TYPE=Release", "-DUNDERSTORY_ASSERTS=ON", "-DUNDERSTORY_WERROR=ON"]
@@ -19,6 +21,7 @@ SANITIZED = [
     "-DCMAKE_CXX_FLAGS_RELWITHDEBINFO=-O1 -g1",
     "-DUNDERSTORY_ASSERTS=ON",
 ]
+PIECES, PIECE_TIMEOUT_S = 16, 600  # of a test program under a sanitizer
 # Clones and build folders share what is compiled alike.
 CCACHE = {
     "CCACHE_BASEDIR": str(ROOT),
@@ -88,6 +91,35 @@ def run_ctest(folder, label_pattern="", suffix="", env=None):
         results["ctest"] = SuiteResult("ctest", failed=[f"ctest ended with status {status}"])
     say(f"  ran in {time.monotonic() - began:.0f} s")
     return list(results.values())
+
+
+def run_in_pieces(program, name, env):
+    """A GoogleTest program's tests in PIECES processes, as SuiteResult `name`. One process for each
+    test, as ctest has it, takes longer to start with a sanitizer than most tests take."""
+    result = SuiteResult(name)
+    began = time.monotonic()
+    folder = program.parent / name
+    shutil.rmtree(folder, ignore_errors=True)
+
+    def run(piece):
+        report = folder / f"{piece}.xml"
+        shard = {"GTEST_TOTAL_SHARDS": str(PIECES), "GTEST_SHARD_INDEX": str(piece)}
+        command = ["timeout", str(PIECE_TIMEOUT_S), program, f"--gtest_output=xml:{report}"]
+        status = run_logged(command, folder / f"{piece}.log", env={**env, **shard})
+        return piece, status, report
+
+    with concurrent.futures.ThreadPoolExecutor(os.cpu_count() or 1) as pool:
+        for piece, status, report in pool.map(run, range(PIECES)):
+            failed_before = len(result.failed)
+            if report.exists():
+                count_report(report, program.name, result)
+            if status != 0 and len(result.failed) == failed_before:
+                result.failed.append(f"{program.name}, piece {piece}, ended with status {status}")
+            if status != 0:
+                show_log(folder / f"{piece}.log")
+            say(f"  {piece + 1} of {PIECES}")
+    result.duration_s = time.monotonic() - began
+    return result
 
 
 def count_case(case, result):

@@ -13,6 +13,7 @@ class SuiteResult:
     passed: int = 0
     failed: list = dataclasses.field(default_factory=list)  # of names
     skipped: list = dataclasses.field(default_factory=list)  # of (name, reason)
+    reasons: dict = dataclasses.field(default_factory=dict)  # of what failed, as far as known
     note: str = ""
     duration_s: float = 0.0
     is_absent: bool = False  # this machine cannot run it, and need not

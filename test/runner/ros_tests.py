@@ -6,10 +6,10 @@ import shutil
 import sys
 import time
 import unittest
-import xml.etree.ElementTree
 
 from catkin_check import WORKSPACE, built_workspace
 from commands import ROOT, run_logged, say, show_log
+from junit import count_report
 from results import SuiteResult
 
 sys.path.append(str(ROOT / "test" / "support"))
@@ -24,33 +24,16 @@ TIMEOUT_S = 960
 PATIENT = ("robustness", "sameness", "services")
 
 
-def count_file(root, name, result):
-    """Adds what one program reported; GoogleTest and rosunit write alike."""
-    for case in root.iter("testcase"):
-        case_name = f"{name}: {case.get('classname', '')}.{case.get('name')}"
-        skipped = case.find("skipped")
-        bad = case.findall("failure") + case.findall("error")
-        if bad:
-            result.failed.append(case_name)
-            reasons = "\n".join(part.text or part.get("message", "") for part in bad)
-            say(f"\n-- FAILED: {case_name}\n{reasons}")
-        elif skipped is not None or case.get("status") == "notrun":
-            reason = skipped.get("message") if skipped is not None else "disabled"
-            result.skipped.append((case_name, " ".join((reason or "no reason given").split())))
-        else:
-            result.passed += 1
-
-
 def count_results(folder, name, result):
     """Adds the results of one .test file; returns how many tests they tell of."""
     before = result.ran + len(result.skipped)
     for path in sorted(folder.rglob("rosunit-*.xml")):
-        count_file(xml.etree.ElementTree.parse(path).getroot(), name, result)
+        count_report(path, name, result)
     counted = result.ran + len(result.skipped) - before
     # rostest's own report has a case per program: failed if it hung, died or reported nothing.
     own = SuiteResult(name)
     for path in folder.rglob("rostest-*.xml"):
-        count_file(xml.etree.ElementTree.parse(path).getroot(), name, own)
+        count_report(path, name, own)
     result.failed += own.failed
     return counted
 

@@ -7,6 +7,7 @@ import contextlib
 import io
 import pathlib
 import sys
+import traceback
 import unittest
 import unittest.mock
 
@@ -260,33 +261,44 @@ class TestFiles(unittest.TestCase):
 
 
 class HilJobs(unittest.TestCase):
-    """A boot's results, first beside another one."""
+    """A boot's results, and those of another if it is wanted."""
 
     @staticmethod
-    def settled(first, trouble, *alone):
-        runs = iter(alone)
+    def settled(first, *again):
+        runs = iter(again)
         with contextlib.redirect_stdout(io.StringIO()):
-            found = hil_tests.settled(first, trouble, lambda: next(runs))
-        assert next(runs, None) is None, "it did not run alone"
+            found = hil_tests.settled(first, lambda: next(runs))
+        assert next(runs, None) is None, "it did not run again"
         return found
 
-    def test_a_failure_on_a_slow_machine_counts_if_it_comes_again(self):
+    def test_a_failure_counts_if_it_comes_again_and_else_is_named(self):
         first = SuiteResult("wire_hil", passed=1, failed=["wire_hil: late"])
-        for second in (
-            SuiteResult("wire_hil", passed=2),
-            SuiteResult("wire_hil", passed=1, failed=["wire_hil: wrong"]),
-        ):
-            self.assertIs(self.settled(first, "it stood still", second), second)
+        passed = SuiteResult("wire_hil", passed=2)
+        failed = SuiteResult("wire_hil", passed=1, failed=["wire_hil: late"])
+        otherwise = SuiteResult("wire_hil", passed=1, failed=["wire_hil: wrong"])
 
-    def test_a_failure_on_a_good_machine_counts(self):
-        first = SuiteResult("wire_hil", failed=["wire_hil: wrong"])
+        self.assertEqual(self.settled(first, passed), (passed, ["wire_hil: late"]))
+        self.assertEqual(self.settled(first, failed), (failed, []))
+        self.assertEqual(self.settled(first, otherwise), (otherwise, ["wire_hil: late"]))
 
-        self.assertIs(self.settled(first, ""), first)
+    def test_what_must_never_happen_counts_at_once(self):
+        reasons = {"wire_hil: armed": self.trace_of_never()}
+        first = SuiteResult("wire_hil", failed=["wire_hil: armed"], reasons=reasons)
+
+        self.assertEqual(self.settled(first), (first, []))
+
+    @staticmethod
+    def trace_of_never():
+        try:
+            machine.PatientTest.assert_never(True, "armed all the same")
+        except machine.Never:
+            return traceback.format_exc()
+        return ""
 
     def test_what_passed_does_not_run_again(self):
         first = SuiteResult("wire_hil", passed=2)
 
-        self.assertIs(self.settled(first, "it stood still"), first)
+        self.assertEqual(self.settled(first), (first, []))
 
 
 if __name__ == "__main__":

@@ -14,6 +14,7 @@ sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "runner"))
 
 import builds  # noqa: E402
 import hil_tests  # noqa: E402
+import junit  # noqa: E402
 import results  # noqa: E402
 import ros_tests  # noqa: E402
 import tidy  # noqa: E402
@@ -66,7 +67,10 @@ class CountTest(unittest.TestCase):
 def counted_file(xml_text):
     """The SuiteResult after the report of one program of a .test file."""
     result = SuiteResult("ros")
-    ros_tests.count_file(xml.etree.ElementTree.fromstring(xml_text), "topics", result)
+    with tempfile.TemporaryDirectory() as folder:
+        path = pathlib.Path(folder) / "report.xml"
+        path.write_text(xml_text)
+        junit.count_report(path, "topics", result)
     return result
 
 
