@@ -27,8 +27,18 @@ TEAM = {
     "volume_at": [{"time_s": 300.0, "volume_m3": 5000.0}, {"time_s": 600.0, "volume_m3": 8900.0}],
     "least_separation_m": 1.75,
     "team": [
-        {"seen_volume_m3": 4000.0, "bytes_per_s": 900.0, "peak_bytes_per_s": 12000},
-        {"seen_volume_m3": 5000.0, "bytes_per_s": 1100.0, "peak_bytes_per_s": 11000},
+        {
+            "seen_volume_m3": 4000.0,
+            "bytes_per_s": 900.0,
+            "peak_bytes_per_s": 12000,
+            "steady_peak_bytes_per_s": 7000,
+        },
+        {
+            "seen_volume_m3": 5000.0,
+            "bytes_per_s": 1100.0,
+            "peak_bytes_per_s": 11000,
+            "steady_peak_bytes_per_s": 8000,
+        },
     ],
 }
 
@@ -52,6 +62,7 @@ class Teams(unittest.TestCase):
         self.assertEqual(row["least_separation_m"], "1.75")
         self.assertEqual(row["sent_bytes_per_s"], "1100.0")
         self.assertEqual(row["sent_peak_bytes"], "12000")
+        self.assertEqual(row["sent_steady_peak_bytes"], "8000")
 
     def test_overlap_is_what_was_seen_more_than_once(self):
         self.assertEqual(self.row(explored_volume_m3=7200.0)["overlap"], "0.25")

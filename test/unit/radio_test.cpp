@@ -231,6 +231,24 @@ TEST(SimulatedRadio, SendsNoMoreThanItsRateInAnySecond) {
   }
 }
 
+TEST(SimulatedRadio, WhatIsSentWhenAContactBeginsIsNoSteadyPeak) {
+  Team team(without_loss(), 2);
+  team.positions_m[1].x() = 1000.0;
+  team.run(std::chrono::seconds(1));
+  for (std::uint32_t item = 0; item < 50; ++item) {
+    team.radio.link(0).publish(tile(item, 1));
+  }
+  team.positions_m[1].x() = 10.0;
+  team.run(kCatchUp + std::chrono::seconds(2));
+  for (std::uint32_t item = 0; item < 7; ++item) {
+    team.radio.link(0).publish(tile(item, 2));
+  }
+  team.run(std::chrono::seconds(1));
+
+  EXPECT_EQ(team.radio.use(0).peak_bytes_in_a_second, 50000U);
+  EXPECT_EQ(team.radio.use(0).steady_peak_bytes_in_a_second, 7000U);
+}
+
 TEST(SimulatedRadio, OneTransmissionServesAllInContactAndCountsOnce) {
   Team team(without_loss(), 5);
   team.positions_m[4].x() = 1000.0;

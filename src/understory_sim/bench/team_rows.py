@@ -7,7 +7,7 @@ import statistics
 VOLUME_TIMES_S = (300, 600, 900, 1200, 1500)
 VOLUMES = [f"volume_{time_s}_s" for time_s in VOLUME_TIMES_S]
 MEASURED = ["team_size", "least_separation_m", "balance", "overlap"]
-MEASURED += ["sent_bytes_per_s", "sent_peak_bytes"]
+MEASURED += ["sent_bytes_per_s", "sent_peak_bytes", "sent_steady_peak_bytes"]
 COLUMNS = MEASURED + VOLUMES
 
 
@@ -34,6 +34,8 @@ def measured(result):
         values["overlap"] = sum(seen) / united - 1.0 if united else None
         values["sent_bytes_per_s"] = max(mate["bytes_per_s"] for mate in mates)
         values["sent_peak_bytes"] = max(mate["peak_bytes_per_s"] for mate in mates)
+        # Without what is sent when a contact begins.
+        values["sent_steady_peak_bytes"] = max(mate["steady_peak_bytes_per_s"] for mate in mates)
     return {name: values.get(name) for name in COLUMNS}
 
 
@@ -59,14 +61,15 @@ def markdown(groups):
     times = " | ".join(f"m3 at {time_s} s" for time_s in VOLUME_TIMES_S)
     lines = [
         f"| scene | strategy | vehicles | balance, mean / least | overlap | least separation m "
-        f"| sent B/s | peak B in 1 s | {times} |",
+        f"| sent B/s | peak B in 1 s, in contact | {times} |",
         "|" + "---|" * (8 + len(VOLUMES)),
     ]
     for (title, _, strategy), rows in groups.items():
         balance = f"{_mean(rows, 'balance', 2)} / {_worst(rows, 'balance', min, 2)}"
         cells = [title, strategy, rows[0]["team_size"], balance]
         cells += [_mean(rows, "overlap", 2), _worst(rows, "least_separation_m", min, 2)]
-        cells += [_mean(rows, "sent_bytes_per_s", 0), _worst(rows, "sent_peak_bytes", max, 0)]
+        peaks = [_worst(rows, f"sent_{kind}peak_bytes", max, 0) for kind in ("", "steady_")]
+        cells += [_mean(rows, "sent_bytes_per_s", 0), ", ".join(peaks)]
         cells += [_mean(rows, name, 0) for name in VOLUMES]
         lines.append("| " + " | ".join(cells) + " |")
     return "\n".join(lines) + "\n"

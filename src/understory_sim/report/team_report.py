@@ -87,6 +87,7 @@ def rows_of(result: dict) -> List[List[str]]:
             _cell(mate, "seen_volume_m3", 0),
             _cell(mate, "bytes_per_s", 0),
             _cell(mate, "peak_bytes_per_s", 0),
+            _cell(mate, "steady_peak_bytes_per_s", 0),
         ]
         for mate in result.get("team", [])
         if isinstance(mate, dict)
@@ -94,7 +95,7 @@ def rows_of(result: dict) -> List[List[str]]:
 
 
 HEADER = ["vehicle", "nothing left after, s", "distance, m", "mean, m/s", "seen itself, m³"]
-HEADER += ["sent, B/s", "most in 1 s, B"]
+HEADER += ["sent, B/s", "most in 1 s, B", "the same in contact"]
 
 
 def render(result: dict, images: List[Tuple[str, bytes]], names: List[str], page) -> str:

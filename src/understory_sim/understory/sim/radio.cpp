@@ -124,7 +124,13 @@ void SimulatedRadio::advance(Time now, const std::vector<Vector3d>& positions_m)
   assert(positions_m.size() == stations_.size());
   assert(!has_advanced_ || now >= advanced_to_);
   const Time begin = has_advanced_ ? advanced_to_ : now;
+  const std::vector<VehicleSet> before = contacts_;
   find_contacts(now, positions_m);
+  for (std::size_t vehicle = 0; vehicle < stations_.size(); ++vehicle) {
+    if ((contacts_[vehicle] & ~before[vehicle]) != 0) {
+      stations_[vehicle]->note_contact(now);
+    }
+  }
   for (std::size_t sender = 0; sender < stations_.size(); ++sender) {
     send(static_cast<int>(sender), begin, now);
   }

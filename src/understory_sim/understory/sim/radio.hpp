@@ -60,11 +60,15 @@ struct RadioConfig {
   }
 };
 
+inline constexpr Duration kCatchUp = std::chrono::seconds(5);
+
 // Of one vehicle; counts of samples that were received by or lost to it, of bytes that it sent.
 struct RadioUse {
   std::uint64_t samples_sent = 0;  // transmissions: one for all receivers
   std::uint64_t bytes_sent = 0;
   std::uint64_t peak_bytes_in_a_second = 0;  // of any second, aligned or not
+  // The same without the first kCatchUp of a contact, in which what was missed is sent.
+  std::uint64_t steady_peak_bytes_in_a_second = 0;
   std::uint64_t samples_delivered = 0;
   std::uint64_t samples_lost = 0;
 };

@@ -64,6 +64,10 @@ void RadioStation::note_sent(std::uint64_t bytes, Time end) {
     last_second_.pop_front();
   }
   use_.peak_bytes_in_a_second = std::max(use_.peak_bytes_in_a_second, bytes_in_last_second_);
+  if (contact_at_ && last_second_.front().end - *contact_at_ > kCatchUp) {
+    use_.steady_peak_bytes_in_a_second =
+        std::max(use_.steady_peak_bytes_in_a_second, bytes_in_last_second_);
+  }
 }
 
 bool RadioStation::draw_loss(double loss, int receiver) {

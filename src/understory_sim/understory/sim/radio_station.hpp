@@ -9,6 +9,7 @@
 #include <deque>
 #include <map>
 #include <memory>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -32,6 +33,8 @@ class RadioStation : public team::Link {
   [[nodiscard]] const RadioUse& use() const { return use_; }
   [[nodiscard]] Time free_at() const { return free_at_; }
 
+  // There is somebody more who hears it.
+  void note_contact(Time now) { contact_at_ = now; }
   // The transmitter is busy until `end`.
   void note_sent(std::uint64_t bytes, Time end);
   // Whether the receiver misses a packet of this vehicle.
@@ -59,6 +62,7 @@ class RadioStation : public team::Link {
   std::uint64_t arrivals_ = 0;
   std::deque<Transmission> last_second_;
   std::uint64_t bytes_in_last_second_ = 0;
+  std::optional<Time> contact_at_;
   RadioUse use_;
 };
 

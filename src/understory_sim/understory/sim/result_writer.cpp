@@ -114,7 +114,8 @@ Json team_json(const std::vector<TeamMateResult>& team) {
                    {"coverage", rounded(mate.coverage)},
                    {"bytes_sent", mate.bytes_sent},
                    {"bytes_per_s", rounded(mate.bytes_per_s)},
-                   {"peak_bytes_per_s", mate.peak_bytes_per_s}});
+                   {"peak_bytes_per_s", mate.peak_bytes_per_s},
+                   {"steady_peak_bytes_per_s", mate.steady_peak_bytes_per_s}});
   }
   return all;
 }

@@ -64,6 +64,7 @@ struct TeamMateResult {
   std::uint64_t bytes_sent = 0;
   double bytes_per_s = 0.0;
   std::uint64_t peak_bytes_per_s = 0;
+  std::uint64_t steady_peak_bytes_per_s = 0;  // without what is sent when a contact begins
 };
 
 // Keys of result.json by the same names. What never happened is null there.

@@ -315,6 +315,7 @@ void TeamRun::add_mate(std::size_t id, const MissionResult& alone, MissionResult
   mate.bytes_sent = radio.bytes_sent;
   mate.bytes_per_s = static_cast<double>(radio.bytes_sent) / std::max(1.0, to_seconds(now_));
   mate.peak_bytes_per_s = radio.peak_bytes_in_a_second;
+  mate.steady_peak_bytes_per_s = radio.steady_peak_bytes_in_a_second;
   team.collisions = team.collisions.value_or(0) + alone.collisions.value_or(0);
   team.min_clearance_m =
       std::min(team.min_clearance_m.value_or(10.0), alone.min_clearance_m.value_or(10.0));
