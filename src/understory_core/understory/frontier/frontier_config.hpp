@@ -67,6 +67,7 @@ struct FrontierConfig {
   double min_island_m3 = 0.0;
   double max_island_m3 = 0.0;
   double max_left_share = 0.0;
+  double trunk_in_island_m3 = 0.0;
   double max_island_share = 1.0;
   double seen_share = 0.2;
   ViewpointConfig viewpoints;
@@ -93,8 +94,12 @@ struct FrontierConfig {
     f.field("max_left_share",
             max_left_share,
             in_range(0.0, 1.0),
-            "the frontier around islands that are left is at most this part of all known voxels, "
-            "unless those below min_island_m3 are more");
+            "the islands that are left are at most this part of the known volume, each counted for "
+            "every cluster at it, unless those below min_island_m3 are more");
+    f.field("trunk_in_island_m3",
+            trunk_in_island_m3,
+            in_range(0.0, 100.0),
+            "so much of each island does not count there: the inside of a trunk is never seen");
     f.field("max_island_share",
             max_island_share,
             in_range(0.0, 1.0),

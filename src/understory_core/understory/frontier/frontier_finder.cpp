@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <bitset>
+#include <cmath>
 #include <iterator>
 
 #include "understory/frontier/clustering.hpp"
@@ -262,18 +263,20 @@ void FrontierFinder::count_known(const MapSnapshot& snapshot,
 
 // The size from which on an island is worth a visit: the fewer are left so far, the larger.
 double FrontierFinder::least_island_m3() const {
-  std::vector<std::pair<double, std::size_t>> islands;  // size, and the frontier around it
+  std::vector<double> islands_m3;
   for (const auto& [id, member] : members_) {
     if (is_large(*member) && member->island_m3) {
-      islands.emplace_back(*member->island_m3, member->voxels.size());
+      islands_m3.push_back(*member->island_m3);
     }
   }
-  std::sort(islands.begin(), islands.end());
-  double room = config_.max_left_share * static_cast<double>(all_known_voxels_);
+  std::sort(islands_m3.begin(), islands_m3.end());
+  const double known_m3 =
+      static_cast<double>(all_known_voxels_) * std::pow(geometry_.resolution_m(), 3);
+  double room_m3 = config_.max_left_share * known_m3;
   double least_m3 = std::max(config_.min_island_m3, config_.max_island_m3);
-  for (const auto& [island_m3, frontier_voxels] : islands) {
-    room -= static_cast<double>(frontier_voxels);
-    if (room < 0.0) {
+  for (const double island_m3 : islands_m3) {
+    room_m3 -= std::max(0.0, island_m3 - config_.trunk_in_island_m3);
+    if (room_m3 < 0.0) {
       least_m3 = std::clamp(island_m3, config_.min_island_m3, least_m3);
       break;
     }
