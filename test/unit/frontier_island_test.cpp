@@ -12,11 +12,10 @@ namespace {
 
 using test::SnapshotBuilder;
 using Bench = test::FrontierBench;
-
-const Box3d& kBox = test::kFrontierBox;
+using test::kFrontierBox;
 
 TEST(FrontierFinder, KeepsApartWhatBordersAnIslandTooSmallToVisit) {
-  SnapshotBuilder builder(0.10, kBox);
+  SnapshotBuilder builder(0.10, kFrontierBox);
   builder.fill(VoxelState::kFree);
   builder.set_box({Vector3d(-0.5, -0.5, 0.5), Vector3d(0.5, 0.5, 1.5)}, VoxelState::kUnknown);
   FrontierConfig config;
@@ -34,7 +33,7 @@ TEST(FrontierFinder, KeepsApartWhatBordersAnIslandTooSmallToVisit) {
 
 // Cubes of unknown space, their sizes in cubic metres, with free space around.
 std::vector<double> islands_worth_a_visit(const FrontierConfig& config) {
-  SnapshotBuilder builder(0.10, kBox);
+  SnapshotBuilder builder(0.10, kFrontierBox);
   builder.fill(VoxelState::kFree);
   double x_m = -4.0;
   for (const double edge_m : {0.8, 0.9, 1.0, 1.1}) {
@@ -56,7 +55,7 @@ TEST(FrontierFinder, LeavesTheSmallestIslandsUntilEnoughAreLeft) {
   config.max_cluster_length_m = 10.0;  // a cluster for each island
   config.min_island_m3 = 0.6;
   config.max_island_m3 = 1.2;
-  const double known_m3 = kBox.volume() - (0.512 + 0.729 + 1.0 + 1.331);
+  const double known_m3 = kFrontierBox.volume() - (0.512 + 0.729 + 1.0 + 1.331);
 
   config.max_left_share = 1.0;
   EXPECT_EQ(islands_worth_a_visit(config), (std::vector<double>{1.331}));
@@ -74,13 +73,13 @@ TEST(FrontierFinder, LeavesNoIslandThatIsALargePartOfTheBox) {
   FrontierConfig config;
   config.min_cluster_voxels = 10;
   config.min_island_m3 = 2.0;
-  config.max_island_share = 0.6 / kBox.volume();
+  config.max_island_share = 0.6 / kFrontierBox.volume();
 
   EXPECT_EQ(islands_worth_a_visit(config), (std::vector<double>{0.729, 1.0, 1.331}));
 }
 
 TEST(FrontierFinder, HasMoreRoomForIslandsTheMoreIsKnown) {
-  SnapshotBuilder builder(0.10, kBox);
+  SnapshotBuilder builder(0.10, kFrontierBox);
   builder.set_box({Vector3d(-3, -3, 0), Vector3d(0, 0, 2)}, VoxelState::kFree);
   builder.set_box({Vector3d(-2, -2, 0.5), Vector3d(-1, -1, 1.5)}, VoxelState::kUnknown);
   FrontierConfig config;

@@ -15,8 +15,7 @@ namespace {
 
 using test::SnapshotBuilder;
 using Bench = test::FrontierBench;
-
-const Box3d& kBox = test::kFrontierBox;
+using test::kFrontierBox;
 
 bool is_frontier_by_definition(const MapSnapshot& map, const VoxelIndex& voxel) {
   if (!map.is_free(voxel)) {
@@ -69,7 +68,7 @@ TEST(FrontierField, AgreesWithTheDefinitionAfterRandomChanges) {
 }
 
 TEST(FrontierFinder, EveryFrontierVoxelOfAnIslandBelongsToOneCluster) {
-  SnapshotBuilder builder(0.10, kBox);
+  SnapshotBuilder builder(0.10, kFrontierBox);
   builder.fill(VoxelState::kFree)
       .set_box({Vector3d(1, 1, 0), Vector3d(2, 2, 2)}, VoxelState::kUnknown);
   Bench bench(builder);
@@ -90,7 +89,7 @@ TEST(FrontierFinder, EveryFrontierVoxelOfAnIslandBelongsToOneCluster) {
 }
 
 TEST(FrontierFinder, ClustersAreAtMostAsLongAsConfigured) {
-  SnapshotBuilder builder(0.10, kBox);
+  SnapshotBuilder builder(0.10, kFrontierBox);
   builder.fill(VoxelState::kUnknown)
       .set_box({Vector3d(-6, -6, 0), Vector3d(6, 0, 2)}, VoxelState::kFree);
   Bench bench(builder);
@@ -105,7 +104,7 @@ TEST(FrontierFinder, ClustersAreAtMostAsLongAsConfigured) {
 
 TEST(FrontierFinder, IncrementalUpdateFindsTheSameFrontierAsAFreshOne) {
   Rng rng(5);
-  SnapshotBuilder builder(0.10, kBox);
+  SnapshotBuilder builder(0.10, kFrontierBox);
   Bench incremental(builder);
   for (int round = 0; round < 10; ++round) {
     builder.set_ball(
@@ -131,7 +130,7 @@ TEST(FrontierFinder, IncrementalUpdateFindsTheSameFrontierAsAFreshOne) {
 }
 
 TEST(FrontierFinder, ViewpointsAreClearAndSeeTheirCluster) {
-  SnapshotBuilder builder(0.10, kBox);
+  SnapshotBuilder builder(0.10, kFrontierBox);
   builder.fill(VoxelState::kFree)
       .set_box({Vector3d(1, 1, 0), Vector3d(2, 2, 2)}, VoxelState::kUnknown)
       .set_cylinder({0.0, 1.5}, 0.2, VoxelState::kOccupied);
@@ -187,7 +186,7 @@ TEST(FrontierFinder, FewViewpointsKeptAreTheBestOfMany) {
 }
 
 TEST(FrontierFinder, ClusterWithoutViewpointIsDormantAndWakesWhenTheMapNearItChanges) {
-  SnapshotBuilder builder(0.10, kBox);
+  SnapshotBuilder builder(0.10, kFrontierBox);
   builder.fill(VoxelState::kOccupied)
       .set_box({Vector3d(-3, -0.5, 0), Vector3d(0, 0.5, 2)}, VoxelState::kFree)
       .set_box({Vector3d(-3, -0.1, 0), Vector3d(0, 0.1, 2)}, VoxelState::kFree)
@@ -208,7 +207,7 @@ TEST(FrontierFinder, ClusterWithoutViewpointIsDormantAndWakesWhenTheMapNearItCha
 }
 
 TEST(FrontierFinder, ClusterCountsAsSeenAfterAFifthOfItIsGone) {
-  SnapshotBuilder builder(0.10, kBox);
+  SnapshotBuilder builder(0.10, kFrontierBox);
   builder.fill(VoxelState::kFree)
       .set_box({Vector3d(1, 1, 0), Vector3d(2, 2, 2)}, VoxelState::kUnknown);
   Bench bench(builder);
@@ -231,7 +230,7 @@ MapSnapshotPtr room_with_pillar(SnapshotBuilder& builder, double angle_rad) {
 }
 
 TEST(TrailLabel, ClusterSurroundedByFreeSpaceIsATrail) {
-  SnapshotBuilder builder(0.10, kBox);
+  SnapshotBuilder builder(0.10, kFrontierBox);
   builder.fill(VoxelState::kFree)
       .set_box({Vector3d(1, 1, 0), Vector3d(1.6, 1.6, 2)}, VoxelState::kUnknown);
   Bench bench(builder);
@@ -242,7 +241,7 @@ TEST(TrailLabel, ClusterSurroundedByFreeSpaceIsATrail) {
 }
 
 TEST(TrailLabel, BorderOfALargeUnknownRegionIsAFrontier) {
-  SnapshotBuilder builder(0.10, kBox);
+  SnapshotBuilder builder(0.10, kFrontierBox);
   builder.fill(VoxelState::kUnknown)
       .set_box({Vector3d(-6, -6, 0), Vector3d(6, 0, 2)}, VoxelState::kFree);
   Bench bench(builder);
@@ -258,7 +257,7 @@ TEST(TrailLabel, BorderOfALargeUnknownRegionIsAFrontier) {
 
 TEST(TrailLabel, DoesNotDependOnTheMapsAxes) {
   for (const double angle_rad : {0.0, 0.3, 0.785, 1.2, 1.571, 2.4}) {
-    SnapshotBuilder builder(0.10, kBox);
+    SnapshotBuilder builder(0.10, kFrontierBox);
     const MapSnapshotPtr map = room_with_pillar(builder, angle_rad);
     std::vector<VoxelIndex> voxels;
     const VoxelBox& all = map->geometry.voxels();
@@ -278,7 +277,7 @@ TEST(TrailLabel, DoesNotDependOnTheMapsAxes) {
 }
 
 TEST(TrailLabel, IslandBesideForeignUnknownSpaceIsNotSurrounded) {
-  SnapshotBuilder builder(0.10, kBox);
+  SnapshotBuilder builder(0.10, kFrontierBox);
   builder.fill(VoxelState::kFree)
       .set_box({Vector3d(0, 0, 0), Vector3d(0.5, 0.5, 2)}, VoxelState::kUnknown)
       .set_box({Vector3d(-6, -6, 0), Vector3d(-0.3, 6, 2)}, VoxelState::kUnknown);
