@@ -90,8 +90,8 @@ TEST(TeamCost, AnExplorerIsNotHeldBackByACollector) {
   const CoordinationConfig config = authors_values();
   const Peers peers{peer_at({46.0, 0.0, 0.0}, FlightMode::kCollector)};
 
-  EXPECT_EQ(team_cost(config, {{}, 0.0, FlightMode::kExplorer}, peers), 0.0);
-  EXPECT_DOUBLE_EQ(team_cost(config, {{}, 0.0, FlightMode::kCollector}, peers), 3.0);
+  EXPECT_EQ(team_cost(config, {Vector3d::Zero(), 0.0, FlightMode::kExplorer}, peers), 0.0);
+  EXPECT_DOUBLE_EQ(team_cost(config, {Vector3d::Zero(), 0.0, FlightMode::kCollector}, peers), 3.0);
 }
 
 TEST(TeamCost, WhoIsNearerHasTheBetterClaim) {
@@ -99,8 +99,8 @@ TEST(TeamCost, WhoIsNearerHasTheBetterClaim) {
   config.claim_weight = 0.5;
   const Peers peers{peer_at({8.0, 0.0, 0.0})};
 
-  EXPECT_DOUBLE_EQ(team_cost(config, {{}, 18.0, FlightMode::kExplorer}, peers), 5.0);
-  EXPECT_EQ(team_cost(config, {{}, 7.0, FlightMode::kExplorer}, peers), 0.0);
+  EXPECT_DOUBLE_EQ(team_cost(config, {Vector3d::Zero(), 18.0, FlightMode::kExplorer}, peers), 5.0);
+  EXPECT_EQ(team_cost(config, {Vector3d::Zero(), 7.0, FlightMode::kExplorer}, peers), 0.0);
 }
 
 TEST(TeamCost, WhoIsOutOfContactHasNoSay) {
