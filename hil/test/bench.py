@@ -152,6 +152,12 @@ class Listener:
         self._thread.join()
         self._socket.close()
 
+    def catch_up(self, patience_s: float = 5.0) -> None:
+        """Until what has been said so far has been read, on a bus where something is always said: the
+        thread that listens may lag behind, and what it has last is not the last then."""
+        now_s = time.time()
+        wait_until(lambda: self.frames and self.frames[-1][0] >= now_s, "a frame", patience_s)
+
     def of(self, name: str, since_s: float = 0.0, until_s: float = 1e12) -> List[Said]:
         """Those whose checksum is right."""
         message = BY_NAME[name]

@@ -50,6 +50,7 @@ class SilenceOfTheHost(WireTest):
     """In one direction, of one kind of message."""
 
     def last(self, name: str, before_s: float) -> float:
+        self.far_bus.catch_up()
         return self.far_bus.of(name, until_s=before_s)[-1].stamp_s
 
     def test_of_setpoints_means_late_then_hold_then_land(self) -> None:
@@ -60,6 +61,7 @@ class SilenceOfTheHost(WireTest):
         late = self.bus.wait_for("VEH_STATE", lambda said: said["FlagLate"] == 1, since_s=silent_s)
         hold = self.bus.wait_for_state("HOLD", since_s=silent_s)
         land = self.bus.wait_for_state("LAND", since_s=silent_s)
+        self.far_bus.catch_up()
         begin_s = self.far_bus.last_flown(hold.stamp_s).stamp_s
         self.assert_after(LATE_S, begin_s, late, "FlagLate")
         self.assert_after(HOLD_S, begin_s, hold, "HOLD")
@@ -110,6 +112,7 @@ class SilenceOfTheVehicle(WireTest):
         silent_s = self.wire.become(to="host", drop=ODOMETRY)
         host.wait_for_line("FAULT ARMED .*fallen silent")
         time.sleep(0.3)
+        self.bus.catch_up()
 
         begin_s = self.bus.of("ODO_RATE")[-1].stamp_s
         # A landing vehicle no longer reports standstills by what this end hears of odometry.
@@ -145,6 +148,7 @@ class SilenceOfTheVehicle(WireTest):
         self.wire.become(to="host", drop=["VEH_STATE"])
         host.wait_for_line("FAULT ARMED .*fallen silent")
         time.sleep(0.2)
+        self.bus.catch_up()
 
         begin_s = self.bus.of("VEH_STATE")[-1].stamp_s
         self.assert_link_lost(begin_s)

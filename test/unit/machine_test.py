@@ -271,15 +271,28 @@ class HilJobs(unittest.TestCase):
         assert next(runs, None) is None, "it did not run again"
         return found
 
-    def test_a_failure_counts_if_it_comes_again_and_else_is_named(self):
-        first = SuiteResult("wire_hil", passed=1, failed=["wire_hil: late"])
-        passed = SuiteResult("wire_hil", passed=2)
-        failed = SuiteResult("wire_hil", passed=1, failed=["wire_hil: late"])
-        otherwise = SuiteResult("wire_hil", passed=1, failed=["wire_hil: wrong"])
+    @staticmethod
+    def one_of_two(failed):
+        reasons = {name: "AssertionError: late" for name in failed}
+        return SuiteResult("wire_hil", passed=2 - len(failed), failed=failed, reasons=reasons)
 
-        self.assertEqual(self.settled(first, passed), (passed, ["wire_hil: late"]))
-        self.assertEqual(self.settled(first, failed), (failed, []))
-        self.assertEqual(self.settled(first, otherwise), (otherwise, ["wire_hil: late"]))
+    def test_a_test_counts_as_failed_if_it_fails_in_both_boots_and_else_is_named(self):
+        first, other = self.one_of_two(["wire_hil: a"]), self.one_of_two(["wire_hil: b"])
+
+        found, named = self.settled(first, self.one_of_two([]))
+        self.assertEqual((found.passed, found.failed, named), (2, [], ["wire_hil: a"]))
+        found, named = self.settled(first, self.one_of_two(["wire_hil: a"]))
+        self.assertEqual((found.passed, found.failed, named), (1, ["wire_hil: a"], []))
+        found, named = self.settled(first, other)
+        self.assertEqual((found.passed, found.failed), (2, []))
+        self.assertEqual(named, ["wire_hil: a", "wire_hil: b"])
+
+    def test_a_second_boot_that_goes_wrong_is_a_failure(self):
+        nothing = SuiteResult("wire_hil", failed=["wire_hil produced no results (status 1)"])
+
+        found, _ = self.settled(self.one_of_two(["wire_hil: a"]), nothing)
+
+        self.assertEqual(found.failed, nothing.failed)
 
     def test_what_must_never_happen_counts_at_once(self):
         reasons = {"wire_hil: armed": self.trace_of_never()}
