@@ -72,7 +72,7 @@ class Wire:
             for _ in range(AT_ONCE):
                 data = receive(FRAME.size, socket.MSG_DONTWAIT)
                 self.counts["frames"] += 1
-                for frame in self._suffer(source, data) if is_hit and self._faults else [data]:
+                for frame in self._suffer(source, data) if is_hit else [data]:
                     send(frame)
 
     def _happens(self, fault: str) -> bool:

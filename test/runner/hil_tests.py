@@ -3,7 +3,8 @@
 """The HIL suite: every hil/test/*_hil.py and the port's GoogleTest program with a bus of their own
 each, and the bus provider from outside. One at a time for every two processors: a booted kernel has
 one, and where system calls are slow it takes all of it, and the host a good part of another. What
-failed runs again alone, once, and counts if it fails again; the summary names what failed in one boot only."""
+failed runs again alone, once, and counts if it fails again; the summary names what failed in one
+boot only."""
 
 import concurrent.futures
 import os
@@ -78,6 +79,13 @@ def may_be_chance(found):
     return not any(NEVER in found.reasons.get(name, "") for name in found.failed)
 
 
+def passed_in(boot, test):
+    """Where a boot went wrong as a whole there is a failure without a reason, and nothing passed."""
+    went_well = all(name in boot.reasons for name in boot.failed)
+    is_skipped = any(name == test for name, _ in boot.skipped)
+    return went_well and test not in boot.failed and not is_skipped
+
+
 def settled(first, run_again):
     """The results that count, and what failed in one boot only. Times here are those of a shared
     machine: what failed must fail again, but what must never happen may not happen once."""
@@ -87,8 +95,7 @@ def settled(first, run_again):
     second = run_again()
     if not may_be_chance(second):
         return second, []
-    # Of a test that passed the first time there is a reason; of a boot that went wrong there is none.
-    chance = {name for name in second.failed if name not in first.failed and name in second.reasons}
+    chance = {name for name in second.failed if name in second.reasons and passed_in(first, name)}
     counts = SuiteResult(
         first.name,
         second.passed + len(chance),

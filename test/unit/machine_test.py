@@ -294,6 +294,16 @@ class HilJobs(unittest.TestCase):
 
         self.assertEqual(found.failed, nothing.failed)
 
+    def test_what_did_not_pass_the_first_time_either_is_a_failure(self):
+        second = self.one_of_two(["wire_hil: b"])
+        nothing = SuiteResult("wire_hil", failed=["wire_hil produced no results (status 1)"])
+        skipping = self.one_of_two(["wire_hil: a"])
+        skipping.skipped = [("wire_hil: b", "hopeless")]
+
+        for first in (nothing, skipping):
+            found, _ = self.settled(first, second)
+            self.assertEqual(found.failed, ["wire_hil: b"])
+
     def test_what_must_never_happen_counts_at_once(self):
         reasons = {"wire_hil: armed": self.trace_of_never()}
         first = SuiteResult("wire_hil", failed=["wire_hil: armed"], reasons=reasons)
