@@ -107,6 +107,31 @@ class RosCountTest(unittest.TestCase):
             self.assertEqual(result.failed, ["topics: rostest.testtopics"])
 
 
+# As a GoogleTest program: piece 1 fails, piece 2 dies, piece 3 leaks after it has reported.
+PIECES_PROGRAM = """#!/bin/sh
+[ "$GTEST_SHARD_INDEX" = 2 ] && exit 9
+[ "$GTEST_SHARD_INDEX" = 1 ] && bad='<failure message="wrong"/>'
+mkdir -p "$(dirname "${1#--gtest_output=xml:}")"
+echo "<testsuite><testcase classname='A' name='b$GTEST_SHARD_INDEX'>$bad</testcase></testsuite>" \\
+  > "${1#--gtest_output=xml:}"
+[ "$GTEST_SHARD_INDEX" = 3 ] && exit 1
+[ -z "$bad" ]
+"""
+
+
+class PiecesTest(unittest.TestCase):
+    def test_each_piece_counts_and_none_ends_badly_unnoticed(self):
+        with tempfile.TemporaryDirectory() as folder:
+            program = pathlib.Path(folder) / "test_x"
+            program.write_text(PIECES_PROGRAM)
+            program.chmod(0o755)
+            result = builds.run_in_pieces(program, "x-asan", {})
+
+        self.assertEqual(result.passed, builds.PIECES - 2)
+        expected = ["test_x, piece 2, ended with status 9", "test_x, piece 3, ended with status 1"]
+        self.assertEqual(result.failed, ["test_x: A.b1", *expected])
+
+
 class HilTest(unittest.TestCase):
     def found_without_a_bus(self, environment):
         with unittest.mock.patch.object(hil_tests, "why_no_bus", return_value="no bus"):
