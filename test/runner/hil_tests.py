@@ -3,8 +3,8 @@
 """The HIL suite: every hil/test/*_hil.py and the port's GoogleTest program with a bus of their own
 each, and the bus provider from outside. One at a time for every two processors: a booted kernel has
 one, and where system calls are slow it takes all of it, and the host a good part of another. What
-failed runs again alone, once, and counts if it fails again; the summary names what failed in one
-boot only."""
+failed or was skipped runs again alone, once, and counts so if it does not pass then either; the
+summary names what passed in one boot only."""
 
 import concurrent.futures
 import os
@@ -82,27 +82,33 @@ def may_be_chance(found):
 def passed_in(boot, test):
     """Where a boot went wrong as a whole there is a failure without a reason, and nothing passed."""
     went_well = all(name in boot.reasons for name in boot.failed)
-    is_skipped = any(name == test for name, _ in boot.skipped)
-    return went_well and test not in boot.failed and not is_skipped
+    return went_well and test not in boot.failed and test not in names_of_skipped(boot)
 
 
 def settled(first, run_again):
-    """The results that count, and what failed in one boot only. Times here are those of a shared
-    machine: what failed must fail again, but what must never happen may not happen once."""
-    if not first.failed or not may_be_chance(first):
+    """The results that count, and what passed in one boot only. Times here are those of a shared
+    machine: what failed or found no time must do so again, but what must never happen may not
+    happen once."""
+    if not (first.failed or first.skipped) or not may_be_chance(first):
         return first, []
     say(f"  {first.name}: again, alone")
     second = run_again()
     if not may_be_chance(second):
         return second, []
-    chance = {name for name in second.failed if name in second.reasons and passed_in(first, name)}
+    chance = {name for name in second.failed if name in second.reasons} | names_of_skipped(second)
+    chance = {name for name in chance if passed_in(first, name)}
     counts = SuiteResult(
         first.name,
         second.passed + len(chance),
         [name for name in second.failed if name not in chance],
-        second.skipped,
+        [(name, reason) for name, reason in second.skipped if name not in chance],
     )
-    return counts, sorted(set(first.failed) - set(second.failed) | chance)
+    recovered = (set(first.failed) | names_of_skipped(first)) - set(second.failed)
+    return counts, sorted(recovered - names_of_skipped(second) | chance)
+
+
+def names_of_skipped(boot):
+    return {name for name, _ in boot.skipped}
 
 
 def run_once(name, command, folder):
@@ -176,4 +182,4 @@ def add_settled(done, commands, folder, result):
         result.failed += found.failed
         result.skipped += found.skipped
     if once:
-        result.note = f"failed in one of two boots: {', '.join(once)}"
+        result.note = f"passed in one of two boots only: {', '.join(once)}"

@@ -304,6 +304,17 @@ class HilJobs(unittest.TestCase):
             found, _ = self.settled(first, second)
             self.assertEqual(found.failed, ["wire_hil: b"])
 
+    def test_a_test_is_skipped_if_neither_boot_had_time_for_it(self):
+        skipping = SuiteResult("wire_hil", passed=1, skipped=[("wire_hil: a", "hopeless")])
+
+        found, named = self.settled(skipping, self.one_of_two([]))
+        self.assertEqual((found.passed, found.skipped, named), (2, [], ["wire_hil: a"]))
+        found, named = self.settled(self.one_of_two(["wire_hil: b"]), skipping)
+        self.assertEqual((found.passed, found.skipped), (2, []))
+        self.assertEqual(named, ["wire_hil: a", "wire_hil: b"])
+        found, named = self.settled(skipping, skipping)
+        self.assertEqual((found.passed, found.skipped, named), (1, skipping.skipped, []))
+
     def test_what_must_never_happen_counts_at_once(self):
         reasons = {"wire_hil: armed": self.trace_of_never()}
         first = SuiteResult("wire_hil", failed=["wire_hil: armed"], reasons=reasons)
