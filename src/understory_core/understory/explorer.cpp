@@ -3,8 +3,12 @@
 #include "understory/explorer.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <numeric>
+#include <utility>
+
+#include "understory/plan/way_out.hpp"
 
 namespace understory {
 namespace {
@@ -305,6 +309,33 @@ TrajectoryPtr Explorer::try_targets(
   return nullptr;
 }
 
+std::vector<Vector3d> Explorer::way_out(const Pilot& pilot, Time now) {
+  return understory::way_out(pilot.clearance(),
+                             tight_routes_,
+                             config_.plan.vehicle_radius_m + config_.plan.margin_m,
+                             pilot.next_start_point(now).position_m);
+}
+
+// Null: it is in none, or on its way out.
+TrajectoryPtr Explorer::leave_pocket(Pilot& pilot, Time now) {
+  if (!pilot.is_at_rest(now) || !has_open_clusters()) {
+    return nullptr;
+  }
+  std::vector<Vector3d> route_m = way_out(pilot, now);
+  if (route_m.empty()) {
+    return nullptr;
+  }
+  const Vector3d course_m = route_m.back() - route_m.front();
+  const Limits limits = config_.limits.limits_for(FlightMode::kExplorer);
+  const Result<TrajectoryPtr, PlanError> flown =
+      pilot.fly({std::move(route_m),
+                 std::atan2(course_m.y(), course_m.x()),
+                 FlightMode::kTransit,
+                 limits},
+                now);
+  return flown ? *flown : nullptr;
+}
+
 ExploreStep Explorer::decide(Pilot& pilot, Time now, bool in_danger) {
   ExploreStep step;
   step.decided = true;
@@ -322,11 +353,14 @@ ExploreStep Explorer::decide(Pilot& pilot, Time now, bool in_danger) {
     RouteSearch& routes = reach == Reach::kThroughTightGaps ? tight_routes_ : routes_;
     if (choice.target &&
         (reach != Reach::kFar || has_route(routes, choice.input, *choice.target))) {
+      is_leaving_pocket_ = false;
       step.published = try_targets(pilot, routes, std::move(choice), now, in_danger);
       return step;
     }
   }
-  step.status = ExploreStatus::kNothingLeft;
+  step.published = leave_pocket(pilot, now);
+  is_leaving_pocket_ = step.published || (is_leaving_pocket_ && !pilot.is_at_rest(now));
+  step.status = is_leaving_pocket_ ? ExploreStatus::kFlying : ExploreStatus::kNothingLeft;
   return step;
 }
 

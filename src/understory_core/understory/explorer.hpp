@@ -57,8 +57,10 @@ class Explorer {
   [[nodiscard]] const ExplorerCounters& counters() const { return counters_; }
   [[nodiscard]] const SetAsideList& set_aside() const { return set_aside_; }
   [[nodiscard]] RouteSearch& routes() { return routes_; }
-  // For who is boxed in: routes with no more room than a trajectory must have.
+  // For who is boxed in: routes with no more room than a trajectory must have, and the way out
+  // where there are none (way_out.hpp).
   [[nodiscard]] RouteSearch& tight_routes() { return tight_routes_; }
+  [[nodiscard]] std::vector<Vector3d> way_out(const Pilot& pilot, Time now);
 
  private:
   // How far targets are looked for; the lengths to those far away are estimates with kFar.
@@ -87,6 +89,7 @@ class Explorer {
   [[nodiscard]] TrajectoryPtr try_targets(
       Pilot& pilot, RouteSearch& routes, Choice choice, Time now, bool in_danger);
   [[nodiscard]] std::vector<Sight> sights(const Candidate& target) const;
+  [[nodiscard]] TrajectoryPtr leave_pocket(Pilot& pilot, Time now);
   void adopt(const Target& target, const Pilot& pilot, Time now);
 
   ExplorerConfig config_;
@@ -103,6 +106,7 @@ class Explorer {
   std::optional<Target> target_;
   Time target_deadline_{};
   Time last_decision_{};
+  bool is_leaving_pocket_ = false;
   ExplorerCounters counters_;
 };
 

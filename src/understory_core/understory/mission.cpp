@@ -248,6 +248,21 @@ void Mission::resume_at_home() {
   }
 }
 
+// What failed before is tried through tight gaps, then out of a pocket.
+std::vector<Vector3d> Mission::route_home(Time now) {
+  const int attempt = strikes_ / kStrikesPerFailure % 3;
+  if (attempt == 2) {
+    return explorer_.way_out(pilot_, now);
+  }
+  RouteSearch& routes = attempt == 0 ? explorer_.routes() : explorer_.tight_routes();
+  const RouteLattice::Node home = routes.lattice().nearest(home_m_);
+  routes.run(pilot_.clearance(),
+             pilot_.next_start_point(now).position_m,
+             {home},
+             std::numeric_limits<double>::infinity());
+  return routes.route_m(home);
+}
+
 TrajectoryPtr Mission::fly_home(Time now) {
   const TrajectoryPoint here = pilot_.next_start_point(now);
   const bool is_home = (here.position_m - home_m_).head<2>().norm() < kArrivedM;
@@ -263,12 +278,7 @@ TrajectoryPtr Mission::fly_home(Time now) {
   TrajectoryPtr leg;
   if (in_danger || is_due) {
     last_leg_ = now;
-    RouteSearch& routes =
-        strikes_ / kStrikesPerFailure % 2 == 0 ? explorer_.routes() : explorer_.tight_routes();
-    const RouteLattice::Node home = routes.lattice().nearest(home_m_);
-    routes.run(
-        pilot_.clearance(), here.position_m, {home}, std::numeric_limits<double>::infinity());
-    std::vector<Vector3d> route = routes.route_m(home);
+    std::vector<Vector3d> route = route_home(now);
     int strikes = kStrikesPerFailure;
     if (!route.empty()) {
       const Result<TrajectoryPtr, PlanError> flown =

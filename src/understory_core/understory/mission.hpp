@@ -118,6 +118,7 @@ class Mission {
   TrajectoryPtr climb(Time now);
   TrajectoryPtr explore(const ExploreStep& step, Time now);
   void resume_at_home();
+  [[nodiscard]] std::vector<Vector3d> route_home(Time now);
   TrajectoryPtr fly_home(Time now);
   TrajectoryPtr descend(Time now);
   TrajectoryPtr fly_leg(const Vector3d& to_m, Time now);
