@@ -62,6 +62,20 @@ TEST(ExplorerCost, UsesTheHeadingAtHover) {
   EXPECT_LT(ahead, aside);
 }
 
+TEST(ExplorerCost, CountsTheTimeThatTheCameraTurnsAfterTheVehicleIsThere) {
+  ExplorerCollectorConfig config;
+  config.explorer.wait_weight = 5.0;
+  const StrategyInput input = eastbound();
+  const auto cost_of = [&](double distance_m) {
+    return strategy(config).explorer_cost(
+        input, candidate_at(1, {distance_m, 0, 0}, kFrontier, 1.8));  // 2 s of turning
+  };
+
+  EXPECT_DOUBLE_EQ(cost_of(3.0), 3.0 + 5.0 * (2.0 - 1.0));
+  EXPECT_DOUBLE_EQ(cost_of(6.0), 6.0);
+  EXPECT_DOUBLE_EQ(cost_of(9.0), 9.0);
+}
+
 TEST(CollectorCost, IsTimeToReachPlusTimeToTurn) {
   EXPECT_DOUBLE_EQ(strategy().collector_cost(eastbound(), candidate_at(1, {6, 0, 0}, kTrail, 1.8)),
                    2.0 + 2.0);

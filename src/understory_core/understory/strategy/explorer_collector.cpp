@@ -77,6 +77,16 @@ double ExplorerCollector::yaw_time_s(const StrategyInput& input, const Candidate
          rates_.yaw_rate_radps;
 }
 
+// Of the camera's turn, what is left of it when the vehicle could be there.
+double ExplorerCollector::wait_time_s(const StrategyInput& input,
+                                      const Candidate& candidate) const {
+  return std::max(0.0, yaw_time_s(input, candidate) - path_time_s(candidate));
+}
+
+double ExplorerCollector::path_time_s(const Candidate& candidate) const {
+  return candidate.route_length_m / rates_.collector_speed_mps;
+}
+
 double ExplorerCollector::greedy_cost(const StrategyInput& input,
                                       const Candidate& candidate) const {
   const ExplorerCostConfig& weights = config_.explorer;
@@ -84,6 +94,7 @@ double ExplorerCollector::greedy_cost(const StrategyInput& input,
   return weights.distance_weight * candidate.route_length_m + weights.label_weight * label_cost +
          weights.ring_weight * ring_m(candidate.cluster->mean_m) +
          weights.yaw_weight * yaw_time_s(input, candidate) +
+         weights.wait_weight * wait_time_s(input, candidate) +
          shared_cost(input, candidate, FlightMode::kExplorer);
 }
 
@@ -103,8 +114,7 @@ double ExplorerCollector::explorer_cost(const StrategyInput& input,
 
 double ExplorerCollector::collector_cost(const StrategyInput& input,
                                          const Candidate& candidate) const {
-  const double path_time_s = candidate.route_length_m / rates_.collector_speed_mps;
-  return config_.collector.path_weight * path_time_s +
+  return config_.collector.path_weight * path_time_s(candidate) +
          config_.collector.yaw_weight * yaw_time_s(input, candidate) +
          config_.collector.momentum_weight *
              momentum_time_s(input, candidate.viewpoint.position_m) +

@@ -50,6 +50,7 @@ struct ExplorerCostConfig {
   double trail_penalty = 1.0;
   double ring_weight = 0.0;
   double yaw_weight = 0.0;
+  double wait_weight = 0.0;
   double ahead_distance_m = 6.0;
   double ahead_angle_rad = 0.6;
   double greedy_distance_m = 10.0;
@@ -72,6 +73,11 @@ struct ExplorerCostConfig {
             yaw_weight,
             in_range(0.0, 1000.0),
             "per second of turning the camera, as a Collector pays it; not in the paper");
+    f.field("wait_weight",
+            wait_weight,
+            in_range(0.0, 1000.0),
+            "per second that the camera still has to turn once the vehicle could be there; not in "
+            "the paper");
     f.field("ahead_distance_m",
             ahead_distance_m,
             in_range(0.5, 1000.0),
@@ -156,6 +162,8 @@ class ExplorerCollector final : public Strategy {
                                    const Candidate& candidate,
                                    FlightMode mode) const;
   [[nodiscard]] double yaw_time_s(const StrategyInput& input, const Candidate& candidate) const;
+  [[nodiscard]] double wait_time_s(const StrategyInput& input, const Candidate& candidate) const;
+  [[nodiscard]] double path_time_s(const Candidate& candidate) const;
   [[nodiscard]] double ring_m(const Vector3d& position_m) const;
   [[nodiscard]] double momentum_time_s(const StrategyInput& input,
                                        const Vector3d& position_m) const;
