@@ -62,20 +62,6 @@ TEST(ExplorerCost, UsesTheHeadingAtHover) {
   EXPECT_LT(ahead, aside);
 }
 
-TEST(ExplorerCost, CountsTheTimeThatTheCameraTurnsAfterTheVehicleIsThere) {
-  ExplorerCollectorConfig config;
-  config.explorer.wait_weight = 5.0;
-  const StrategyInput input = eastbound();
-  const auto cost_of = [&](double distance_m) {
-    return strategy(config).explorer_cost(
-        input, candidate_at(1, {distance_m, 0, 0}, kFrontier, 1.8));  // 2 s of turning
-  };
-
-  EXPECT_DOUBLE_EQ(cost_of(3.0), 3.0 + 5.0 * (2.0 - 1.0));
-  EXPECT_DOUBLE_EQ(cost_of(6.0), 6.0);
-  EXPECT_DOUBLE_EQ(cost_of(9.0), 9.0);
-}
-
 TEST(CollectorCost, IsTimeToReachPlusTimeToTurn) {
   EXPECT_DOUBLE_EQ(strategy().collector_cost(eastbound(), candidate_at(1, {6, 0, 0}, kTrail, 1.8)),
                    2.0 + 2.0);
@@ -119,6 +105,23 @@ TEST(Choice, ExplorerPrefersWhatLiesAhead) {
                       candidate_at(2, {4, 0, 0}, kFrontier)};
 
   EXPECT_EQ(strategy().choose(input)->candidate.cluster->id, 2U);
+}
+
+// The nearer one is looked at aside: 2 s of turning for 1 s of flight.
+TEST(Choice, ExplorerDoesNotWaitForItsCameraWhereThereIsAmpleChoice) {
+  ExplorerCollectorConfig config;
+  config.explorer.wait_weight = 2.0;
+  StrategyInput input = eastbound();
+  input.candidates = {candidate_at(1, {3, 0, 0}, kFrontier, 1.8),
+                      candidate_at(2, {4, 0, 0}, kFrontier)};
+
+  config.explorer.wait_ample_clusters = 2.0;
+  EXPECT_EQ(strategy(config).choose(input)->candidate.cluster->id, 2U);
+  config.explorer.wait_ample_clusters = 5.0;
+  EXPECT_EQ(strategy(config).choose(input)->candidate.cluster->id, 1U);
+  config.explorer.wait_weight = 0.0;
+  config.explorer.wait_ample_clusters = 2.0;
+  EXPECT_EQ(strategy(config).choose(input)->candidate.cluster->id, 1U);
 }
 
 TEST(Choice, NothingAheadFallsBackToGreedyThenToTheNearestAnywhere) {

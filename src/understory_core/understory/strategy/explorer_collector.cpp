@@ -29,6 +29,17 @@ std::optional<Candidate> cheapest(const std::vector<Candidate>& candidates,
   return best == nullptr ? std::nullopt : std::make_optional(*best);
 }
 
+// Candidates of a cluster follow on one another.
+double cluster_count(const StrategyInput& input) {
+  double count = 0.0;
+  const Cluster* counted = nullptr;
+  for (const Candidate& candidate : input.candidates) {
+    count += candidate.cluster.get() != counted ? 1.0 : 0.0;
+    counted = candidate.cluster.get();
+  }
+  return count;
+}
+
 bool is_same_target(const ClusterPtr& target, const Candidate& candidate) {
   return target != nullptr && is_same_place(*target, *candidate.cluster);
 }
@@ -83,6 +94,12 @@ double ExplorerCollector::wait_time_s(const StrategyInput& input,
   return std::max(0.0, yaw_time_s(input, candidate) - path_time_s(candidate));
 }
 
+// Where there is little choice, who passes over what is near has to come back for it.
+double ExplorerCollector::wait_weight_for(const StrategyInput& input) const {
+  const double share = cluster_count(input) / config_.explorer.wait_ample_clusters;
+  return config_.explorer.wait_weight * std::min(1.0, share);
+}
+
 double ExplorerCollector::path_time_s(const Candidate& candidate) const {
   return candidate.route_length_m / rates_.collector_speed_mps;
 }
@@ -94,7 +111,6 @@ double ExplorerCollector::greedy_cost(const StrategyInput& input,
   return weights.distance_weight * candidate.route_length_m + weights.label_weight * label_cost +
          weights.ring_weight * ring_m(candidate.cluster->mean_m) +
          weights.yaw_weight * yaw_time_s(input, candidate) +
-         weights.wait_weight * wait_time_s(input, candidate) +
          shared_cost(input, candidate, FlightMode::kExplorer);
 }
 
@@ -151,6 +167,10 @@ std::optional<Candidate> ExplorerCollector::choose_as_explorer(const StrategyInp
   const auto kept = [&](const Candidate& candidate, double cost) {
     return is_same_target(input.target, candidate) ? cost - config_.keep_target_bonus : cost;
   };
+  const double wait_weight = wait_weight_for(input);
+  const auto waited = [&](const Candidate& candidate, double cost) {
+    return kept(candidate, cost + wait_weight * wait_time_s(input, candidate));
+  };
   const auto distance_m = [&](const Candidate& candidate) {
     return (candidate.viewpoint.position_m - input.vehicle.position_m).norm();
   };
@@ -160,7 +180,7 @@ std::optional<Candidate> ExplorerCollector::choose_as_explorer(const StrategyInp
         return distance_m(candidate) <= settings.ahead_distance_m &&
                turn_angle(input, candidate.cluster->mean_m) <= settings.ahead_angle_rad;
       },
-      [&](const Candidate& candidate) { return kept(candidate, explorer_cost(input, candidate)); });
+      [&](const Candidate& candidate) { return waited(candidate, explorer_cost(input, candidate)); });
   if (ahead) {
     return ahead;
   }
@@ -169,7 +189,7 @@ std::optional<Candidate> ExplorerCollector::choose_as_explorer(const StrategyInp
       [&](const Candidate& candidate) {
         return distance_m(candidate) <= settings.greedy_distance_m;
       },
-      [&](const Candidate& candidate) { return kept(candidate, greedy_cost(input, candidate)); });
+      [&](const Candidate& candidate) { return waited(candidate, greedy_cost(input, candidate)); });
   if (near || !input.is_complete) {
     return near;
   }

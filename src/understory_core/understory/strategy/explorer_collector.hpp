@@ -51,6 +51,7 @@ struct ExplorerCostConfig {
   double ring_weight = 0.0;
   double yaw_weight = 0.0;
   double wait_weight = 0.0;
+  double wait_ample_clusters = 50.0;
   double ahead_distance_m = 6.0;
   double ahead_angle_rad = 0.6;
   double greedy_distance_m = 10.0;
@@ -78,6 +79,10 @@ struct ExplorerCostConfig {
             in_range(0.0, 1000.0),
             "per second that the camera still has to turn once the vehicle could be there; not in "
             "the paper");
+    f.field("wait_ample_clusters",
+            wait_ample_clusters,
+            in_range(1.0, 10000.0),
+            "with fewer clusters than this in reach, that counts in proportion less");
     f.field("ahead_distance_m",
             ahead_distance_m,
             in_range(0.5, 1000.0),
@@ -163,6 +168,7 @@ class ExplorerCollector final : public Strategy {
                                    FlightMode mode) const;
   [[nodiscard]] double yaw_time_s(const StrategyInput& input, const Candidate& candidate) const;
   [[nodiscard]] double wait_time_s(const StrategyInput& input, const Candidate& candidate) const;
+  [[nodiscard]] double wait_weight_for(const StrategyInput& input) const;
   [[nodiscard]] double path_time_s(const Candidate& candidate) const;
   [[nodiscard]] double ring_m(const Vector3d& position_m) const;
   [[nodiscard]] double momentum_time_s(const StrategyInput& input,
