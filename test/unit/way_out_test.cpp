@@ -83,8 +83,7 @@ TEST(WayOut, IsFlownToWhatThereIsToSee) {
 
 TEST(WayOut, IsFlownHome) {
   MissionFlight flight(hall_known_between(-8.0, 8.0), {}, Vector3d(-6.0, 0.0, 1.0));
-  flight.builder.set_box({Vector3d(5.0, -1.0, 0.0), Vector3d(8.0, 1.0, 2.0)},
-                         VoxelState::kUnknown);
+  flight.builder.set_box({Vector3d(5.0, -1.0, 0.0), Vector3d(8.0, 1.0, 2.0)}, VoxelState::kUnknown);
   ASSERT_TRUE(flight.fly_until([&] { return flight.here().position_m.x() > 2.0; }));
   put_a_wall(flight.builder, 1.0, kBetweenNodes_m);
 

@@ -327,12 +327,9 @@ TrajectoryPtr Explorer::leave_pocket(Pilot& pilot, Time now) {
   }
   const Vector3d course_m = route_m.back() - route_m.front();
   const Limits limits = config_.limits.limits_for(FlightMode::kExplorer);
-  const Result<TrajectoryPtr, PlanError> flown =
-      pilot.fly({std::move(route_m),
-                 std::atan2(course_m.y(), course_m.x()),
-                 FlightMode::kTransit,
-                 limits},
-                now);
+  const Result<TrajectoryPtr, PlanError> flown = pilot.fly(
+      {std::move(route_m), std::atan2(course_m.y(), course_m.x()), FlightMode::kTransit, limits},
+      now);
   return flown ? *flown : nullptr;
 }
 

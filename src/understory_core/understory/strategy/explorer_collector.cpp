@@ -180,7 +180,9 @@ std::optional<Candidate> ExplorerCollector::choose_as_explorer(const StrategyInp
         return distance_m(candidate) <= settings.ahead_distance_m &&
                turn_angle(input, candidate.cluster->mean_m) <= settings.ahead_angle_rad;
       },
-      [&](const Candidate& candidate) { return waited(candidate, explorer_cost(input, candidate)); });
+      [&](const Candidate& candidate) {
+        return waited(candidate, explorer_cost(input, candidate));
+      });
   if (ahead) {
     return ahead;
   }
