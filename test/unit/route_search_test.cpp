@@ -51,6 +51,28 @@ TEST(RouteSearch, TargetsBeyondTheLimitOrBehindWallsAreNotReached) {
   EXPECT_TRUE(routes.route_m(behind).empty());
 }
 
+TEST(RouteSearch, LeadsAroundBarriersAndNotIntoThem) {
+  SnapshotBuilder builder(0.10, kBox);
+  ClearanceMap map;
+  map.update(builder.fill(VoxelState::kFree).build());
+  RouteSearch routes(builder.geometry(), kClearanceM);
+  const RouteLattice::Node beyond = routes.lattice().nearest({4, 0, 1});
+  const RouteLattice::Node inside = routes.lattice().nearest({0, 0.5, 1});
+  const Barrier barrier{Vector3d(0.0, 0.0, 1.0), 1.5};
+  routes.avoid({barrier});
+
+  routes.run(map, {-4, 0, 1}, {beyond, inside}, kEndlessM);
+
+  EXPECT_FALSE(routes.length_m(inside).has_value());
+  ASSERT_TRUE(routes.length_m(beyond).has_value());
+  for (const Vector3d& at_m : routes.route_m(beyond)) {
+    EXPECT_GE((at_m - barrier.position_m).norm(), barrier.radius_m);
+  }
+  routes.avoid({});
+  routes.run(map, {-4, 0, 1}, {beyond, inside}, kEndlessM);
+  EXPECT_TRUE(routes.length_m(inside).has_value());
+}
+
 TEST(RouteSearch, RoutesKeepTheirClearanceInRandomForests) {
   for (std::uint64_t seed = 1; seed <= 20; ++seed) {
     Rng rng(seed);

@@ -121,6 +121,22 @@ TEST(Traffic, WhoStandsNeverGivesWayAndIsAlwaysGivenIt) {
   EXPECT_TRUE(with_standing({10, 0, 1}).must_give_way_at(*eastward, Time{}));
 }
 
+TEST(Traffic, RoutesAreBarredAroundWhoStandsAndOnlyThere) {
+  const Vector3d here_m(0, 0, 1);
+
+  const Barriers around = with_standing({5, 0, 1}, 0.5).barriers(here_m, Time{});
+  const Barriers close_by = with_standing({1, 0, 1}, 0.5).barriers(here_m, Time{});
+
+  ASSERT_EQ(around.size(), 1U);
+  EXPECT_GT(around[0].radius_m, kDistances.rest_m + 0.5);
+  EXPECT_TRUE(is_barred(around, {0, 1, 1}, {10, 1, 1}));
+  EXPECT_FALSE(is_barred(around, {0, 3, 1}, {10, 3, 1}));
+  EXPECT_FALSE(is_barred(around, {0, 0, 1}, {2, 0, 1})) << "it lies beyond";
+  ASSERT_EQ(close_by.size(), 1U);
+  EXPECT_LT(close_by[0].radius_m, 1.0) << "who is inside may leave";
+  EXPECT_TRUE(with(line({5, 0, 1}, {9, 0, 1})).barriers(here_m, Time{}).empty());
+}
+
 TEST(Traffic, NobodyIsNoTraffic) {
   const TrajectoryPtr eastward = line({0, 0, 1}, {20, 0, 1});
 

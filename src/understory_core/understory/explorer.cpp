@@ -70,6 +70,11 @@ Explorer::Explorer(const ExplorerConfig& config, const GridGeometry& geometry)
       strategy_(make_strategy(config, geometry)),
       set_aside_(duration_from_seconds(config.retry.set_aside_s), config.retry.max_tries) {}
 
+void Explorer::avoid(const Barriers& barriers) {
+  routes_.avoid(barriers);
+  tight_routes_.avoid(barriers);
+}
+
 void Explorer::observe(const MapSnapshotPtr& snapshot) {
   finder_.observe(snapshot);
 }

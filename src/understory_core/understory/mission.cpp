@@ -320,6 +320,7 @@ TrajectoryPtr Mission::descend(Time now) {
 void Mission::set_peers(const team::Peers& peers, Time now) {
   pilot_.set_traffic(team::traffic_of(explorer_config_.team, peers, now));
   explorer_.set_peers(peers);
+  explorer_.avoid(pilot_.barriers(now));
 }
 
 MissionStep Mission::on_map(const MapSnapshotPtr& snapshot, Time now) {

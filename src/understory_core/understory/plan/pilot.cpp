@@ -44,6 +44,7 @@ Result<TrajectoryPtr, PlanError> Pilot::fly(const FlightGoal& goal, Time now) {
   request.start = next_start_point(now);
   request.start_time = next_start(now);
   request.route_m = goal.route_m;
+  request.barriers = barriers(now);
   request.goal_yaw_rad = goal.yaw_rad;
   request.sights = goal.sights;
   request.limits = goal.limits;

@@ -46,6 +46,11 @@ class Pilot {
   // Who else flies here, as known now.
   void set_traffic(Traffic traffic) { traffic_ = std::move(traffic); }
 
+  // Where routes for a trajectory planned now do not lead.
+  [[nodiscard]] Barriers barriers(Time now) const {
+    return traffic_.barriers(next_start_point(now).position_m, next_start(now));
+  }
+
   // Where a trajectory planned now begins.
   [[nodiscard]] Time next_start(Time now) const { return now + lead_; }
   [[nodiscard]] TrajectoryPoint next_start_point(Time now) const {

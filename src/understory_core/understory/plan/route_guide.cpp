@@ -19,10 +19,12 @@ std::size_t farthest_in_sight(const ClearanceMap& map,
                               const std::vector<Vector3d>& route_m,
                               std::size_t from,
                               const ClearanceRule& rule,
+                              const Barriers& barriers,
                               double flown_m) {
   // Doubling, then halving: sight along a route is nearly monotonic, and the answer is verified.
   const auto sees = [&](std::size_t to) {
-    return leg_is_clear(map, route_m[from], route_m[to], rule, flown_m);
+    return leg_is_clear(map, route_m[from], route_m[to], rule, flown_m) &&
+           !is_barred(barriers, route_m[from], route_m[to]);
   };
   const std::size_t last = route_m.size() - 1;
   std::size_t seen = from + 1;
@@ -59,7 +61,8 @@ std::vector<Vector3d> without_repetitions(const std::vector<Vector3d>& route_m) 
 std::vector<Vector3d> shortcut_route(const ClearanceMap& map,
                                      const std::vector<Vector3d>& route_m,
                                      const ClearanceRule& rule,
-                                     double horizon_m) {
+                                     double horizon_m,
+                                     const Barriers& barriers) {
   const std::vector<Vector3d> route = without_repetitions(route_m);
   std::vector<Vector3d> vertices;
   double length_m = 0.0;
@@ -68,7 +71,7 @@ std::vector<Vector3d> shortcut_route(const ClearanceMap& map,
     if (at + 1 == route.size()) {
       break;
     }
-    const std::size_t next = farthest_in_sight(map, route, at, rule, length_m);
+    const std::size_t next = farthest_in_sight(map, route, at, rule, barriers, length_m);
     const double leg_m = (route[next] - route[at]).norm();
     if (length_m + leg_m >= horizon_m) {
       vertices.emplace_back(route[at] + (horizon_m - length_m) / leg_m * (route[next] - route[at]));

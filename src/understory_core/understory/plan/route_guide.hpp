@@ -8,17 +8,20 @@
 
 #include <vector>
 
+#include "understory/plan/barrier.hpp"
 #include "understory/plan/clearance_rule.hpp"
 #include "understory/plan/trajectory.hpp"
 
 namespace understory {
 
 // The route's vertices that remain when every vertex is joined to the farthest later one in sight,
-// at most horizon_m long. Legs that are not clear themselves are kept as they are.
+// at most horizon_m long; none leads through a barrier. Legs that are not clear themselves are kept
+// as they are.
 [[nodiscard]] std::vector<Vector3d> shortcut_route(const ClearanceMap& map,
                                                    const std::vector<Vector3d>& route_m,
                                                    const ClearanceRule& rule,
-                                                   double horizon_m);
+                                                   double horizon_m,
+                                                   const Barriers& barriers = {});
 
 class RouteGuide {
  public:

@@ -81,7 +81,7 @@ void RouteSearch::enter_lattice(const ClearanceMap& map) {
       for (int dy = -shell; dy <= shell; ++dy) {
         for (int dx = -shell; dx <= shell; ++dx) {
           const RouteLattice::Node node = center + Vector3i(dx, dy, dz);
-          if (!passable(map, node)) {
+          if (!passable(map, node) || state_in_this_run(lattice_.index_of(node)).cost == 0) {
             continue;
           }
           const double length_m = (lattice_.point_of(node) - start_m_).norm();
@@ -116,6 +116,27 @@ std::vector<RouteLattice::Node> RouteSearch::mark_targets(
     }
   }
   return marked;
+}
+
+// As if they were impassable.
+void RouteSearch::close_barriers() {
+  for (const Barrier& barrier : barriers_) {
+    const Vector3d reach_m = Vector3d::Constant(barrier.radius_m);
+    const RouteLattice::Node first =
+        lattice_.nearest(barrier.position_m - reach_m).cwiseMax(RouteLattice::Node::Zero());
+    const RouteLattice::Node last = lattice_.nearest(barrier.position_m + reach_m)
+                                        .cwiseMin(lattice_.count() - RouteLattice::Node::Ones());
+    for (int z = first.z(); z <= last.z(); ++z) {
+      for (int y = first.y(); y <= last.y(); ++y) {
+        for (int x = first.x(); x <= last.x(); ++x) {
+          const RouteLattice::Node node(x, y, z);
+          if ((lattice_.point_of(node) - barrier.position_m).norm() < barrier.radius_m) {
+            state_in_this_run(lattice_.index_of(node)).cost = 0;
+          }
+        }
+      }
+    }
+  }
 }
 
 void RouteSearch::relax(const ClearanceMap& map,
@@ -171,6 +192,7 @@ void RouteSearch::run(const ClearanceMap& map,
     budget.emplace(
         lattice_, marked, max_cost, RouteBudget::StepCosts{kStraightCost, kDiagonalCost});
   }
+  close_barriers();
   enter_lattice(map);
   std::size_t open_targets = marked.size();
   std::size_t empty_in_a_row = 0;

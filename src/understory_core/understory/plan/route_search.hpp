@@ -12,8 +12,10 @@
 
 #include <cstdint>
 #include <optional>
+#include <utility>
 #include <vector>
 
+#include "understory/plan/barrier.hpp"
 #include "understory/plan/clearance_map.hpp"
 #include "understory/plan/route_lattice.hpp"
 
@@ -26,6 +28,9 @@ class RouteSearch {
   RouteSearch(const GridGeometry& geometry,
               double clearance_m,
               const RouteLattice::Spacing& spacing);
+
+  // What the runs from now on lead around.
+  void avoid(Barriers barriers) { barriers_ = std::move(barriers); }
 
   // Searches from `start_m` as far as max_length_m, or until every target is settled. `map` must
   // outlive the use of the results. A start that is too close to something enters the lattice at
@@ -64,6 +69,7 @@ class RouteSearch {
 
   std::vector<RouteLattice::Node> mark_targets(const std::vector<RouteLattice::Node>& targets,
                                                double max_cost);
+  void close_barriers();
   void enter_lattice(const ClearanceMap& map);
   void relax(const ClearanceMap& map,
              const RouteLattice::Node& node,
@@ -78,6 +84,7 @@ class RouteSearch {
   int min_edge_squared_distance_;  // half-way along an edge
   std::uint32_t run_ = 0;
   Vector3d start_m_ = Vector3d::Zero();
+  Barriers barriers_;
   std::vector<NodeState> nodes_;
   std::vector<std::vector<std::uint32_t>> buckets_;  // circular, by cost (Dial 1969)
 };

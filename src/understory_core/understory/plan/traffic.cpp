@@ -12,6 +12,7 @@ constexpr Duration kStep = std::chrono::milliseconds(50);
 // Two vehicles that meet at full speed need so long to stand.
 constexpr Duration kLastMoment = std::chrono::milliseconds(2500);
 constexpr double kJitterM = 0.02;
+constexpr double kDetourM = 0.2;  // further away: trajectories cut the corners of their routes
 
 // Where who flies this is from `from` on, step by step, until it rests.
 struct Path {
@@ -77,6 +78,26 @@ Obstruction Traffic::obstruction_of(const Trajectory& planned) const {
         return Obstruction::kStanding;
       }
       found = Obstruction::kPassing;
+    }
+  }
+  return found;
+}
+
+Barriers Traffic::barriers(const Vector3d& from_m, Time time) const {
+  Barriers found;
+  const auto add = [&](const Mover& mover, const Vector3d& place_m) {
+    const double wanted_m = distances_.rest_m + mover.extra_m + kDetourM;
+    const double radius_m = std::min(wanted_m, (from_m - place_m).norm() - kJitterM);
+    if (radius_m > 0.0) {
+      found.push_back({place_m, radius_m});
+    }
+  };
+  for (const Mover& mover : movers_) {
+    if (mover.is_at_rest(time)) {
+      add(mover, mover.position_at(time));
+      for (const Vector3d& place_m : mover.other_places_m) {
+        add(mover, place_m);
+      }
     }
   }
   return found;

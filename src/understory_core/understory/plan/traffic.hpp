@@ -8,6 +8,7 @@
 #include <optional>
 #include <vector>
 
+#include "understory/plan/barrier.hpp"
 #include "understory/plan/trajectory.hpp"
 
 namespace understory {
@@ -46,6 +47,9 @@ class Traffic {
   // Whom does this trajectory, flown from its start to its end and rested on, come too near to?
   // Who is too near already may leave, but come no nearer.
   [[nodiscard]] Obstruction obstruction_of(const Trajectory& planned) const;
+  // Where routes from here do not lead: around who stands still then. Smaller where it is from
+  // there.
+  [[nodiscard]] Barriers barriers(const Vector3d& from_m, Time time) const;
   // When who flies this from `now` on must have given way: to who has way, to who stands still,
   // and to everyone when there is no time left to wait for the other.
   [[nodiscard]] std::optional<Time> must_give_way_at(const Trajectory& flown, Time now) const;

@@ -246,7 +246,7 @@ Result<Trajectory, PlanError> TrajectoryPlanner::plan(const ClearanceMap& map,
   route_m.insert(route_m.end(), request.route_m.begin(), request.route_m.end());
   Task task{map,
             position_state(request.start),
-            shortcut_route(map, route_m, *rule, config_.horizon_m),
+            shortcut_route(map, route_m, *rule, config_.horizon_m, request.barriers),
             *rule,
             request.limits};
   if (!map.clearance_at_least(task.vertices_m.back(), hard_m)) {

@@ -15,6 +15,7 @@
 
 #include "understory/base/config.hpp"
 #include "understory/base/result.hpp"
+#include "understory/plan/barrier.hpp"
 #include "understory/plan/clearance_map.hpp"
 #include "understory/plan/look_around.hpp"
 #include "understory/plan/trajectory.hpp"
@@ -65,6 +66,7 @@ struct PlanRequest {
   TrajectoryPoint start;
   Time start_time{};
   std::vector<Vector3d> route_m;  // from the start's position to the goal, collision-free legs
+  Barriers barriers;              // that the route leads around
   double goal_yaw_rad = 0.0;
   std::vector<Sight> sights;  // to be looked at on the way, where that costs no time
   Limits limits;
