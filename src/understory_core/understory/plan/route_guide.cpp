@@ -15,18 +15,9 @@ constexpr double kCornerDeviation_m = 0.35;
 constexpr double kShortestLeg_m = 1e-6;
 constexpr double kCrawl_mps = 0.05;  // keeps times finite where the speed is zero
 
-std::size_t farthest_in_sight(const ClearanceMap& map,
-                              const std::vector<Vector3d>& route_m,
-                              std::size_t from,
-                              const ClearanceRule& rule,
-                              const Barriers& barriers,
-                              double flown_m) {
-  // Doubling, then halving: sight along a route is nearly monotonic, and the answer is verified.
-  const auto sees = [&](std::size_t to) {
-    return leg_is_clear(map, route_m[from], route_m[to], rule, flown_m) &&
-           !is_barred(barriers, route_m[from], route_m[to]);
-  };
-  const std::size_t last = route_m.size() - 1;
+// Doubling, then halving: sight along a route is nearly monotonic, and the answer is verified.
+template <class Sees>
+std::size_t farthest_in_sight(std::size_t from, std::size_t last, const Sees& sees) {
   std::size_t seen = from + 1;
   std::size_t stride = 2;
   std::size_t hidden = last + 1;
@@ -71,7 +62,11 @@ std::vector<Vector3d> shortcut_route(const ClearanceMap& map,
     if (at + 1 == route.size()) {
       break;
     }
-    const std::size_t next = farthest_in_sight(map, route, at, rule, barriers, length_m);
+    const auto sees = [&](std::size_t to) {
+      return leg_is_clear(map, route[at], route[to], rule, length_m) &&
+             !is_barred(barriers, route[at], route[to]);
+    };
+    const std::size_t next = farthest_in_sight(at, route.size() - 1, sees);
     const double leg_m = (route[next] - route[at]).norm();
     if (length_m + leg_m >= horizon_m) {
       vertices.emplace_back(route[at] + (horizon_m - length_m) / leg_m * (route[next] - route[at]));
