@@ -65,6 +65,16 @@ TEST(WayOut, IsNoneOutOfAClosedRoom) {
   EXPECT_TRUE(way_out_of(pocket(std::nullopt)).empty());
 }
 
+TEST(WayOut, IsNoneThroughSomeoneWhoStandsInTheGap) {
+  SnapshotBuilder builder = pocket(kBetweenNodes_m);
+  ClearanceMap map;
+  map.update(builder.build());
+  RouteSearch routes(builder.geometry(), kClearance_m);
+  routes.avoid({{Vector3d(1.6, kBetweenNodes_m, 1.0), 1.2}});
+
+  EXPECT_TRUE(way_out(map, routes, kClearance_m, kStart_m).empty());
+}
+
 TEST(WayOut, IsNoneWhereTheBoxIsSmallerThanIt) {
   SnapshotBuilder builder(0.1, Box3d(Vector3d(-2.0, -2.0, 0.0), Vector3d(2.0, 2.0, 2.0)));
 

@@ -31,6 +31,7 @@ class RouteSearch {
 
   // What the runs from now on lead around.
   void avoid(Barriers barriers) { barriers_ = std::move(barriers); }
+  [[nodiscard]] const Barriers& avoided() const { return barriers_; }
 
   // Searches from `start_m` as far as max_length_m, or until every target is settled. `map` must
   // outlive the use of the results. A start that is too close to something enters the lattice at

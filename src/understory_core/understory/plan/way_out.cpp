@@ -57,6 +57,7 @@ std::vector<Vector3d> way_out(const ClearanceMap& map,
   every_voxel.step_voxels = 1;
   every_voxel.layer_step_voxels = 2;  // those of the lattice's layers are among them
   RouteSearch fine(surroundings(map.geometry(), start_m), clearance_m, every_voxel);
+  fine.avoid(routes.avoided());
   std::vector<RouteLattice::Node> same;
   same.reserve(ring.size());
   for (const RouteLattice::Node& node : ring) {

@@ -15,7 +15,8 @@
 namespace understory {
 
 // From `start_m` to the nearest node of the routes' lattice that lies 4 m away, with this clearance
-// all the way. Empty: there is no such way, or `routes`, which this runs, have one of their own.
+// all the way, around what the routes avoid. Empty: there is no such way, or `routes`, which this
+// runs, have one of their own.
 [[nodiscard]] std::vector<Vector3d> way_out(const ClearanceMap& map,
                                             RouteSearch& routes,
                                             double clearance_m,
