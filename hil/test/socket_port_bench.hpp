@@ -43,7 +43,7 @@ inline std::vector<PortFrame> receive_until(CanPort& port,
     const std::size_t count = port.receive(batch.data(), batch.size());
     frames.insert(frames.end(), batch.begin(), batch.begin() + count);
     if (count == 0 && !done(frames.size())) {
-      port.wait(std::min(end, port.now() + std::chrono::milliseconds(20)));
+      port.wait(std::chrono::milliseconds(20), WaitFor::kArrivals);
     }
   }
   return frames;

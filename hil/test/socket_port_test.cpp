@@ -107,7 +107,7 @@ TEST_F(SocketPort, WaitingEndsAtItsTime) {
 
   for (int i = 0; i < 50; ++i) {
     const Time until = port.now() + milliseconds(4);
-    port.wait(until);
+    port.wait(milliseconds(4), WaitFor::kArrivals);
     late.push_back(port.now() - until);
   }
 
@@ -137,9 +137,9 @@ TEST_F(SocketPort, WhatANodeSendsReachesAnotherAndIsConfirmed) {
       frame.data[1] = static_cast<std::uint8_t>(i % 16);
       host.send(frame, host.now());
     }
-    host.run_until(host.now() + milliseconds(5), nothing);
+    host.run_until(host.now(), host.now() + milliseconds(5), nothing);
   }
-  host.run_until(host.now() + milliseconds(50), nothing);
+  host.run_until(host.now(), host.now() + milliseconds(50), nothing);
 
   // A busy machine may stall us for longer than a set lives.
   const TxCounters& counters = host.queue().counters();

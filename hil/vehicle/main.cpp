@@ -57,18 +57,20 @@ class StandIn {
   }
 
   void run() {
-    Time world = wall_time();
-    Time listened = world;
+    Time now = wall_time();
+    Time world = now;
+    Time listened = now;
     while (g_interrupted == 0 && !is_quitting_) {
-      const Time now = wall_time();
       if (is_frozen_ || now - world > kLongestCatchUp || now < world - kLongestCatchUp) {
         world = now;  // it has stood still, or the clock was set
       }
       if (is_frozen_) {
         usleep(static_cast<useconds_t>(kListenPeriod.count()));
+        now = wall_time();
       } else {
         world += SimulatedVehicle::kStep;
-        vehicle_->run_until(world);
+        vehicle_->run_until(now, world);
+        now = vehicle_->node().now();
         vehicle_->step(world);
         watch(world);
       }

@@ -50,7 +50,10 @@ class FakeCanPort : public can::CanPort {
     }
     return count;
   }
-  void wait(Time until) override { time = until; }
+  void wait(Duration at_most, can::WaitFor what) override {
+    time += at_most;
+    waited_for.push_back(what);
+  }
   [[nodiscard]] Time now() const override { return time; }
   [[nodiscard]] can::PortState state() const override { return can::PortState::kUp; }
   [[nodiscard]] std::uint64_t session() const override { return session_number; }
@@ -67,6 +70,7 @@ class FakeCanPort : public can::CanPort {
   std::deque<can::SendResult> answers;  // one for each send, then always kSent
   std::vector<can::Frame> sent;
   int tries = 0;
+  std::vector<can::WaitFor> waited_for;
   std::deque<can::PortFrame> arrived;
   Time time{};
   std::uint64_t session_number = 1;

@@ -10,6 +10,7 @@
 namespace understory::can {
 namespace {
 
+using std::chrono::milliseconds;
 using test::at_ms;
 using test::at_us;
 using test::frame_of;
@@ -154,12 +155,22 @@ TEST(MemoryCanBus, WaitingMovesTheClockToTheFirstArrivalOnly) {
   const Frame frame = frame_of(0x123);
   ASSERT_EQ(stations.vehicle->send(frame), SendResult::kSent);
 
-  stations.host->wait(at_ms(5));
+  stations.host->wait(milliseconds(5), WaitFor::kArrivals);
   EXPECT_EQ(stations.host->now(), Time() + length_of(frame));
   EXPECT_EQ(all_of(*stations.host).size(), 1U);
 
-  stations.host->wait(at_ms(5));
+  stations.host->wait(milliseconds(5), WaitFor::kArrivals);
+  EXPECT_EQ(stations.host->now(), at_ms(5) + length_of(frame));
+}
+
+TEST(MemoryCanBus, WhereArrivalsCanWaitTheyDoNotEndTheWait) {
+  TwoStations stations;
+  ASSERT_EQ(stations.vehicle->send(frame_of(0x123)), SendResult::kSent);
+
+  stations.host->wait(milliseconds(5), WaitFor::kChanges);
+
   EXPECT_EQ(stations.host->now(), at_ms(5));
+  EXPECT_EQ(all_of(*stations.host).size(), 1U);
 }
 
 TEST(MemoryCanBus, AtAQuarterOfTheRateAFrameTakesFourTimesAsLong) {
@@ -224,7 +235,7 @@ TEST(MemoryCanBus, WaitingEndsWhenThePortChanges) {
   stations.vehicle->set_on_arrival([&] { stations.host->set_state(PortState::kBusOff); });
   ASSERT_EQ(stations.host->send(frame_of(0x100)), SendResult::kSent);
 
-  stations.host->wait(at_ms(50));
+  stations.host->wait(milliseconds(50), WaitFor::kArrivals);
 
   EXPECT_EQ(stations.host->state(), PortState::kBusOff);
   EXPECT_LT(stations.host->now(), at_ms(1));

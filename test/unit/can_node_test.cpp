@@ -225,9 +225,28 @@ TEST(CanNode, WakesToNoticeThatNoEchoComes) {
   FakeBus bus;
   bus.node->send(frame_of(0x100), at_ms(0));
 
-  bus.node->run_until(at_ms(500), bus.record);
+  bus.node->run_until(at_ms(0), at_ms(500), bus.record);
 
   EXPECT_TRUE(bus.node->is_stalled());
+}
+
+// A frame that comes while nothing of ours is on its way: who answers must hear of it at once.
+TEST(CanNode, OnlyWhoAnswersOrIsSendingWakesForEachFrame) {
+  for (const bool answers : {true, false}) {
+    CanNodeConfig config = host_config();
+    config.answers = answers;
+    auto owned = std::make_unique<FakeCanPort>();
+    const FakeCanPort& port = *owned;
+    CanNode node(std::move(owned), config);
+    Record record;
+
+    node.run_until(at_ms(0), at_ms(1), record);
+    node.send(frame_of(0x100), at_ms(1));
+    node.run_until(at_ms(1), at_ms(2), record);
+
+    const WaitFor idle = answers ? WaitFor::kArrivals : WaitFor::kChanges;
+    EXPECT_THAT(port.waited_for, ElementsAre(idle, WaitFor::kArrivals));
+  }
 }
 
 struct MemoryBus {
@@ -251,7 +270,7 @@ TEST(CanNode, APingIsAnsweredWithinTwoFrames) {
   MemoryBus bus;
   bus.host->send(frame_of(0x180), at_ms(0));
 
-  bus.host->run_until(at_ms(5), bus.record);
+  bus.host->run_until(at_ms(0), at_ms(5), bus.record);
 
   ASSERT_EQ(bus.record.echoes.size(), 1U);
   ASSERT_EQ(bus.record.frames.size(), 1U);
@@ -266,7 +285,7 @@ TEST(CanNode, ASetOfFiveGoesOutBackToBackThroughAWindowOfTwo) {
     bus.host->send(frame_of(id), at_ms(0));
   }
 
-  bus.host->run_until(at_ms(5), bus.record);
+  bus.host->run_until(at_ms(0), at_ms(5), bus.record);
 
   ASSERT_EQ(bus.record.echoes.size(), 5U);
   EXPECT_EQ(bus.bus.busy(), bus.record.echoes.back().stamp - Time() + Duration(3));
@@ -290,11 +309,11 @@ TEST(CanNode, AnUrgentFrameWaitsForThreeOthersAtMost) {
       bus.vehicle->send(frame_of(0x200), now);
       bus.vehicle->poll(bus.answers);
     }
-    bus.host->run_until(now + Duration(static_cast<std::int64_t>(rng.below(300))), bus.record);
+    bus.host->run_until(now, now + Duration(static_cast<std::int64_t>(rng.below(300))), bus.record);
     const Time asked = bus.host->now();
     bus.host->send(frame_of(0x010), asked);
     const std::size_t before = bus.record.echoes.size();
-    bus.host->run_until(asked + Duration(600), bus.record);
+    bus.host->run_until(asked, asked + Duration(600), bus.record);
     for (std::size_t i = before; i < bus.record.echoes.size(); ++i) {
       const PortFrame& echo = bus.record.echoes[i];
       longest = echo.frame.id == 0x010 ? std::max(longest, echo.stamp - asked) : longest;
@@ -318,11 +337,11 @@ TEST(CanNode, AfterBusOffNothingOfTheOldSessionIsSent) {
   node.poll(record);
 
   port.set_state(PortState::kBusOff);
-  node.run_until(at_ms(1), record);
+  node.run_until(at_ms(0), at_ms(1), record);
   node.send(frame_of(0x010), at_ms(1));
-  node.run_until(at_ms(2), record);
+  node.run_until(at_ms(1), at_ms(2), record);
   port.set_state(PortState::kUp);
-  node.run_until(at_ms(3), record);
+  node.run_until(at_ms(2), at_ms(3), record);
 
   EXPECT_TRUE(record.echoes.empty());
   std::array<PortFrame, 8> frames;

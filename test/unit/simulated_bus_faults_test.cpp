@@ -233,7 +233,10 @@ TEST(SimulatedBus, OfTwoVehiclesOnOneBusNoneIsArmed) {
     can::MemoryCanPort& end = *port;
     SimulatedVehicle other({}, BusFlight::start(), Rng(100 + seed), std::move(port));
     end.set_on_arrival([&other] { other.poll(); });
-    flight.on_step = [&](const VehicleState&) { other.step(flight.bus->bus().now()); };
+    flight.on_step = [&](const VehicleState&) {
+      other.step(flight.bus->bus().now());
+      other.poll();
+    };
 
     for (int i = 0; i < 500; ++i) {
       flight.bus->host().arm();

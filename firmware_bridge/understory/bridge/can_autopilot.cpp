@@ -47,7 +47,8 @@ void CanAutopilot::poll() {
 void CanAutopilot::run_until(std::int64_t until_ns) {
   std::int64_t left_us = (until_ns - steady_ns()) / 1000;
   while (left_us > 0) {
-    node_.run_until(wall_time() + Duration(left_us), *this);
+    const Time now = wall_time();
+    node_.run_until(now, now + Duration(left_us), *this);
     left_us = (until_ns - steady_ns()) / 1000;
   }
 }

@@ -26,6 +26,7 @@ CanNodeConfig node_config(bool is_host) {
 
 CanNodeConfig host_node_config() {
   CanNodeConfig config = node_config(true);
+  config.answers = false;
   config.set = id_set({SpPosXy::kId, SpPosZ::kId, SpVel::kId, SpAcc::kId, SpCommit::kId});
   return config;
 }

@@ -9,14 +9,24 @@
 namespace understory::can {
 
 CanNode::CanNode(std::unique_ptr<CanPort> port, const CanNodeConfig& config)
-    : port_(std::move(port)), queue_(config.transmits, config.set), guard_(config.receives) {
+    : port_(std::move(port)),
+      queue_(config.transmits, config.set),
+      guard_(config.receives),
+      answers_(config.answers) {
   assert(port_ != nullptr);
 }
 
-void CanNode::run_until(Time until, FrameHandler& handler) {
-  for (Time now = poll(handler); now < until; now = poll(handler)) {
-    const std::optional<Time> wake = queue_.wake_at();
-    port_->wait(wake ? std::min(until, *wake) : until);
+void CanNode::run_until(Time now, Time until, FrameHandler& handler) {
+  if (queue_.waiting() > 0 || now >= until) {
+    now = poll(handler);
+  }
+  while (now < until) {
+    // An echo makes room for what waits.
+    const bool is_sending = queue_.in_flight() + queue_.waiting() > 0;
+    const Time wake = std::min(until, queue_.wake_at().value_or(until));
+    port_->wait(std::max(wake - now, Duration(0)),
+                answers_ || is_sending ? WaitFor::kArrivals : WaitFor::kChanges);
+    now = poll(handler);
   }
 }
 

@@ -49,6 +49,11 @@ struct CanNodeConfig {
   IdSet transmits;                    // the only identifiers that may be sent
   IdSet set;                          // of these, the ones that are only of use together
   std::vector<NominalRate> receives;  // what others send to us
+  // Whether frames are answered, and so must be handled as they come. Where not, they are handled
+  // together at the end of run_until(), while nothing of this station's own is on its way: a
+  // wake-up for each of them would cost more than all the rest. Their stamps are the kernel's
+  // either way.
+  bool answers = true;
 };
 
 struct CanNodeCounters {
@@ -68,7 +73,7 @@ class CanNode : public FrameSink {
 
   void send(const Frame& frame, Time now) override { queue_.push(frame, now); }
   // Handles what has arrived and sends what may be sent, until `until`.
-  void run_until(Time until, FrameHandler& handler);
+  void run_until(Time now, Time until, FrameHandler& handler);
   // The same once, without waiting. Returns the time.
   Time poll(FrameHandler& handler);
   // When it was last handled; costs no system call.
@@ -90,6 +95,7 @@ class CanNode : public FrameSink {
   std::unique_ptr<CanPort> port_;
   TxQueue queue_;
   FloodGuard guard_;
+  bool answers_;
   std::shared_ptr<FrameTap> tap_;
   std::array<PortFrame, kBatch> batch_;
   Time now_{};

@@ -35,6 +35,12 @@ enum class SendResult : std::uint8_t {
   kDown,  // no bus: not sent
 };
 
+// What ends a port's sleep before its time.
+enum class WaitFor : std::uint8_t {
+  kArrivals,  // or a change of the bus
+  kChanges,   // of the bus; what has arrived can wait
+};
+
 struct PortCounters {
   std::uint64_t received = 0;  // without echoes
   std::uint64_t sent = 0;
@@ -55,8 +61,8 @@ class CanPort {
   [[nodiscard]] virtual SendResult send(const Frame& frame) = 0;
   // What has arrived, oldest first, own echoes among them; at most `most`. Returns how many.
   [[nodiscard]] virtual std::size_t receive(PortFrame* frames, std::size_t most) = 0;
-  // Returns when something has arrived or changed, or at `until`.
-  virtual void wait(Time until) = 0;
+  // Returns after `at_most`, or when what is waited for has happened, or for no reason.
+  virtual void wait(Duration at_most, WaitFor what) = 0;
   [[nodiscard]] virtual Time now() const = 0;
   [[nodiscard]] virtual PortState state() const = 0;
   // Another number after every loss of the bus: what was queued before must not be sent.

@@ -262,11 +262,13 @@ std::size_t MemoryCanPort::receive(PortFrame* frames, std::size_t most) {
   return count;
 }
 
-void MemoryCanPort::wait(Time until) {
+void MemoryCanPort::wait(Duration at_most, WaitFor what) {
   if (bus_.is_delivering()) {
     return;
   }
-  while (station_.received.is_empty() && !station_.has_changed) {
+  const Time until = bus_.now() + at_most;
+  const bool can_arrivals_wait = what == WaitFor::kChanges;
+  while ((can_arrivals_wait || station_.received.is_empty()) && !station_.has_changed) {
     if (!bus_.step(until)) {
       bus_.advance(until);
       break;

@@ -131,7 +131,7 @@ class MemoryCanPort final : public CanPort {
   [[nodiscard]] SendResult send(const Frame& frame) override;
   [[nodiscard]] std::size_t receive(PortFrame* frames, std::size_t most) override;
   // Moves the clock of the bus; returns at once in an arrival function.
-  void wait(Time until) override;
+  void wait(Duration at_most, WaitFor what) override;
   [[nodiscard]] Time now() const override { return bus_.now(); }
   [[nodiscard]] PortState state() const override { return station_.state; }
   [[nodiscard]] std::uint64_t session() const override { return station_.session; }

@@ -9,9 +9,8 @@
 #include <ctime>
 
 #include <linux/can.h>
-#include <sys/epoll.h>
+#include <poll.h>
 #include <sys/socket.h>
-#include <sys/timerfd.h>
 
 #include "understory/base/config.hpp"
 
@@ -77,25 +76,10 @@ PortState state_of(const std::optional<Interface>& found) {
 }  // namespace
 
 SocketCanPort::SocketCanPort(const std::string& interface, const IdSet& ids)
-    : interface_(interface),
-      socket_(ids),
-      epoll_(::epoll_create1(EPOLL_CLOEXEC)),
-      timer_(::timerfd_create(CLOCK_REALTIME, TFD_NONBLOCK | TFD_CLOEXEC)) {
+    : interface_(interface), socket_(ids) {
   check_kernel(interface);
   const std::optional<Interface> found = interface_.look();
   check_interface(interface, found);
-  epoll_event link_events{};
-  link_events.events = EPOLLIN;
-  link_events.data.fd = interface_.fd();
-  // On edges, because then it need not be read.
-  epoll_event timer_events{};
-  timer_events.events = EPOLLIN | EPOLLET;
-  timer_events.data.fd = timer_.get();
-  if (!epoll_.is_open() || !timer_.is_open() ||
-      ::epoll_ctl(epoll_.get(), EPOLL_CTL_ADD, interface_.fd(), &link_events) != 0 ||
-      ::epoll_ctl(epoll_.get(), EPOLL_CTL_ADD, timer_.get(), &timer_events) != 0) {
-    refuse(interface, std::string("cannot wait for it: ") + std::strerror(errno));
-  }
   // Also one that is down, to see now what would be refused then.
   const int error = socket_.open(found->index);
   if (error != 0) {
@@ -105,20 +89,9 @@ SocketCanPort::SocketCanPort(const std::string& interface, const IdSet& ids)
   session_ = 1;
   index_ = found->index;
   opened_ = now();
-  if (state_ == PortState::kUp) {
-    watch_socket();
-  } else {
+  if (state_ != PortState::kUp) {
     socket_.close();
     retry_later(opened_);
-  }
-}
-
-void SocketCanPort::watch_socket() {
-  epoll_event events{};
-  events.events = EPOLLIN;
-  events.data.fd = socket_.fd();
-  if (::epoll_ctl(epoll_.get(), EPOLL_CTL_ADD, socket_.fd(), &events) != 0) {
-    lose(PortState::kGone);
   }
 }
 
@@ -179,7 +152,6 @@ void SocketCanPort::reopen() {
   opened_ = time;
   ++session_;
   ++counters_.reopened;
-  watch_socket();
 }
 
 SendResult SocketCanPort::send(const Frame& frame) {
@@ -213,53 +185,34 @@ std::size_t SocketCanPort::receive(PortFrame* frames, std::size_t most) {
   return arrivals.count;
 }
 
-void SocketCanPort::wait(Time until) {
-  const Time end = socket_.is_open() ? until : std::min(until, reopen_at_);
-  arm(end);
-  is_known_empty_ = true;
-  const bool has_news = handle_events();
+void SocketCanPort::wait(Duration at_most, WaitFor what) {
+  const bool has_news =
+      sleep(socket_.is_open() ? at_most : std::min(at_most, reopen_at_ - now()), what);
   if (!has_news && !socket_.is_open() && now() >= reopen_at_) {
     reopen();
   }
 }
 
-// Absolute, so an end that has passed wakes at once. A step of the clock wakes as well.
-void SocketCanPort::arm(Time until) {
-  if (armed_ == until) {
-    return;
-  }
-  const std::int64_t us = std::max<std::int64_t>(1, until.time_since_epoch().count());
-  itimerspec setting{};
-  setting.it_value.tv_sec = static_cast<time_t>(us / kUsPerSecond);
-  setting.it_value.tv_nsec = static_cast<long>(us % kUsPerSecond * 1000);
-  // ECANCELED: the clock was stepped before; the timer is armed nevertheless.
-  static_cast<void>(::timerfd_settime(
-      timer_.get(), TFD_TIMER_ABSTIME | TFD_TIMER_CANCEL_ON_SET, &setting, nullptr));
-  armed_ = until;
-}
-
 // True: something has arrived or changed.
-bool SocketCanPort::handle_events() {
-  std::array<epoll_event, 3> events{};
-  const int count = ::epoll_wait(epoll_.get(), events.data(), static_cast<int>(events.size()), -1);
-  bool has_news = false;
-  for (int i = 0; i < count; ++i) {
-    const epoll_event& event = events[static_cast<std::size_t>(i)];
-    if (event.data.fd == timer_.get()) {
-      armed_.reset();
-    } else if (event.data.fd == interface_.fd()) {
-      follow_interface();
-      has_news = true;
-    } else if (socket_.is_open() && event.data.fd == socket_.fd()) {
-      is_known_empty_ = false;
-      has_news = true;
-      const int error = (event.events & EPOLLERR) != 0 ? socket_.pending_error() : 0;
-      if (error != 0) {
-        lose_by(error);
-      }
+bool SocketCanPort::sleep(Duration at_most, WaitFor what) {
+  const bool is_listening = what == WaitFor::kArrivals && socket_.is_open();
+  std::array<pollfd, 2> files{{{interface_.fd(), POLLIN, 0}, {socket_.fd(), POLLIN, 0}}};
+  const std::int64_t us = std::max<std::int64_t>(0, at_most.count());
+  const timespec left{static_cast<time_t>(us / kUsPerSecond),
+                      static_cast<long>(us % kUsPerSecond * 1000)};
+  const int count = ::ppoll(files.data(), is_listening ? 2 : 1, &left, nullptr);
+  const bool has_arrivals = count > 0 && files[1].revents != 0;
+  is_known_empty_ = is_listening && count >= 0 && !has_arrivals;
+  if (count > 0 && files[0].revents != 0) {
+    follow_interface();
+  }
+  if (has_arrivals && socket_.is_open() && (files[1].revents & POLLERR) != 0) {
+    const int error = socket_.pending_error();
+    if (error != 0) {
+      lose_by(error);
     }
   }
-  return has_news;
+  return count > 0;
 }
 
 }  // namespace understory::can

@@ -5,19 +5,17 @@
 // the interface; one that is down is no error. In flight, an interface that goes
 // down, disappears or goes bus-off closes the socket; it is opened again as a new session when the
 // kernel says that the interface is back, tried after 10 ms to 1 s. Nothing is ever sent again.
-// Times are CLOCK_REALTIME. One thread, any. System calls: one per frame sent, two per batch
-// received, one more per wait with another end.
+// Times are CLOCK_REALTIME. One thread, any. System calls: one per frame sent, one per batch
+// received, and one per wait.
 #pragma once
 
 #include <cstdint>
-#include <optional>
 #include <string>
 
 #include "understory/can/id_set.hpp"
 #include "understory/port/can_port.hpp"
 #include "understory/port/can_socket.hpp"
 #include "understory/port/interface.hpp"
-#include "understory/port/unique_fd.hpp"
 
 namespace understory::can {
 
@@ -31,7 +29,7 @@ class SocketCanPort final : public CanPort {
 
   [[nodiscard]] SendResult send(const Frame& frame) override;
   [[nodiscard]] std::size_t receive(PortFrame* frames, std::size_t most) override;
-  void wait(Time until) override;
+  void wait(Duration at_most, WaitFor what) override;
   [[nodiscard]] Time now() const override;
   [[nodiscard]] PortState state() const override { return state_; }
   [[nodiscard]] std::uint64_t session() const override { return session_; }
@@ -40,26 +38,21 @@ class SocketCanPort final : public CanPort {
   [[nodiscard]] int receive_buffer_bytes() const { return socket_.receive_buffer_bytes(); }
 
  private:
-  void watch_socket();
   void lose(PortState state);
   void lose_by(int error);
   void retry_later(Time time);
   void follow_interface();
   void reopen();
-  void arm(Time until);
-  [[nodiscard]] bool handle_events();
+  [[nodiscard]] bool sleep(Duration at_most, WaitFor what);
 
   InterfaceWatch interface_;
   CanSocket socket_;
-  UniqueFd epoll_;
-  UniqueFd timer_;
   int index_ = 0;  // of the interface that the socket is bound to
   PortState state_ = PortState::kDown;
   std::uint64_t session_ = 0;
   Time opened_{};
   Time reopen_at_{};
   Duration retry_ = kFirstRetry;
-  std::optional<Time> armed_;
   bool is_known_empty_ = false;  // the last wait has seen that nothing has arrived
   PortCounters counters_;
 };

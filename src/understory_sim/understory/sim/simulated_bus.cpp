@@ -38,6 +38,7 @@ void SimulatedBus::advance(Time until, const StepHook& on_step) {
     now_ += SimulatedVehicle::kStep;
     bus_.advance(now_);
     vehicle_->step(now_);
+    vehicle_->poll();
     on_step(now_, vehicle_->state());
   }
 }

@@ -71,7 +71,6 @@ void SimulatedVehicle::step(Time now) {
   odometry_.step(step_s);
   power_.step(vehicle_.motor_thrusts_n(), step_s);
   station_.send_due(readings(), now, node_);
-  poll();
 }
 
 }  // namespace understory

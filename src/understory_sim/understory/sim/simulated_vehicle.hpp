@@ -44,8 +44,9 @@ class SimulatedVehicle : private can::FrameHandler {
   // Handles what has come on the bus by now.
   void poll() { node_.poll(*this); }
   // Likewise, and waits for more until then.
-  void run_until(Time until) { node_.run_until(until, *this); }
-  // One step of the world of kStep, that ends now; then what telemetry is due.
+  void run_until(Time now, Time until) { node_.run_until(now, until, *this); }
+  // One step of the world of kStep, that ends now. What telemetry is due leaves with the next
+  // poll() or run_until().
   void step(Time now);
 
   // Faults for tests.
