@@ -8,12 +8,11 @@ started), 2 for wrong use, 125 if there is no bus.
 """
 
 import argparse
-import ipaddress
 import os
 import sys
 from typing import Dict, List, NoReturn, Optional, Protocol, Sequence, Tuple
 
-from job import FAILED_STATUS, WIRE_BITRATE, HilError, Job, Network
+from job import FAILED_STATUS, WIRE_BITRATE, HilError, Job
 from native import Native
 from qemu import Qemu
 from relay import Interrupted, is_terminal
@@ -38,15 +37,6 @@ class Parser(argparse.ArgumentParser):
     def error(self, message: str) -> NoReturn:
         """One line, as all commands of the project do."""
         self.exit(WRONG_USE, f"understory hil: {message} (see understory hil --help)\n")
-
-
-def network(text: str) -> Network:
-    number, _, address = text.partition(":")
-    try:
-        os.fstat(int(number))
-        return Network(int(number), str(ipaddress.IPv4Interface(address)))
-    except (OSError, OverflowError, ValueError) as error:
-        raise argparse.ArgumentTypeError(f"{text}: {error}") from error
 
 
 def make_parser() -> argparse.ArgumentParser:
@@ -78,13 +68,6 @@ def make_parser() -> argparse.ArgumentParser:
     )
     parser.add_argument(
         "--wire", action="store_true", help="1 Mbit/s, a queue of 10 frames; means --echo"
-    )
-    parser.add_argument(
-        "--network",
-        type=network,
-        metavar="FD:ADDRESS/PREFIX",
-        help="of a booted kernel: a network card vec0 whose frames come and go as datagrams of the "
-        "socket FD (uml alone)",
     )
     parser.add_argument(
         "--memory", type=int, default=2048, metavar="MIB", help="of a booted kernel (default: 2048)"
@@ -128,7 +111,6 @@ def parse(words: Sequence[str]) -> Tuple[argparse.Namespace, Job]:
         bitrate=WIRE_BITRATE if options.wire else None,
         memory_mib=options.memory,
         is_shell=options.shell,
-        network=options.network,
     )
 
 

@@ -16,14 +16,6 @@ class HilError(Exception):
 
 
 @dataclasses.dataclass(frozen=True)
-class Network:
-    """A card of the booted kernel: its Ethernet frames come and go as datagrams of a socket."""
-
-    socket: int  # open file of ours
-    address: str  # of IPv4, with the length of the prefix
-
-
-@dataclasses.dataclass(frozen=True)
 class Job:
     """A command, the bus it wants and the machine it runs on."""
 
@@ -35,7 +27,6 @@ class Job:
     queue: int = WIRE_QUEUE
     memory_mib: int = 2048
     is_shell: bool = False
-    network: Optional[Network] = None
 
 
 def environment_for(job: Job, provider: str) -> Dict[str, str]:

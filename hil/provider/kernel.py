@@ -58,7 +58,6 @@ class KernelRun(contextlib.AbstractContextManager):  # type: ignore[type-arg]
             "HIL_ECHO": int(job.is_echo),
             "HIL_BITRATE": job.bitrate or "",
             "HIL_QUEUE": job.queue,
-            "HIL_ADDRESS": job.network.address if job.network else "",
         }
         return [f"init={folder}/provider/agent.py", *(f"{k}={v}" for k, v in settings.items())]
 
@@ -126,7 +125,6 @@ def run_kernel(name: str, job: Job, prepare: Callable[[Path, int], Started]) -> 
         ours, theirs = socket.socketpair()
         with ours, theirs:
             command, environment = prepare(run.folder, theirs.fileno())
-            network = (job.network.socket,) if job.network else ()
-            run.start(command, environment, (theirs.fileno(), *network))
+            run.start(command, environment, (theirs.fileno(),))
             theirs.close()
             return run.relay(ours, job)

@@ -83,20 +83,11 @@ def make_buses(settings: Dict[str, str]) -> None:
     lines: List[str] = ["link set lo up"]
     for name in names:
         lines += [f"link add dev {name} type vcan", f"link set {name} up"]
-    if settings["HIL_ADDRESS"]:
-        lines += [f"address add {settings['HIL_ADDRESS']} dev vec0", "link set vec0 up"]
     run("ip", "-batch", "-", text="".join(f"{line}\n" for line in lines))
     if settings["HIL_BITRATE"]:
         netem = f"netem rate {settings['HIL_BITRATE']}bit limit {settings['HIL_QUEUE']}"
         lines = [f"qdisc add dev {name} root {netem}\n" for name in names]
         run("tc", "-batch", "-", text="".join(lines))
-
-
-def write_files_soon() -> None:
-    """Other kernels and the host look at them while the command runs."""
-    for name in ("dirty_expire_centisecs", "dirty_writeback_centisecs"):
-        with open(f"/proc/sys/vm/{name}", "w", encoding="ascii") as file:
-            file.write("50")
 
 
 def prepare() -> None:
@@ -107,5 +98,3 @@ def prepare() -> None:
     socket.sethostname("localhost")
     load_modules(dict(os.environ))
     make_buses(dict(os.environ))
-    if os.environ["HIL_ADDRESS"]:
-        write_files_soon()

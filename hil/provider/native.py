@@ -96,8 +96,6 @@ class Native:
 
     def missing(self, job: Job) -> Optional[str]:
         """Why it cannot work here."""
-        if job.network is not None:
-            return "no --network here"
         if job.existing_interface is not None:
             return self._missing_interface(job, job.existing_interface)
         if find_program("ip") is None:

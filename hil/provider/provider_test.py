@@ -22,7 +22,7 @@ import processes  # noqa: E402
 import registers  # noqa: E402
 import uml  # noqa: E402
 from endings import EndingSignals  # noqa: E402
-from job import HilError, Job, Network  # noqa: E402
+from job import HilError, Job  # noqa: E402
 from relay import Relay  # noqa: E402
 
 
@@ -53,13 +53,6 @@ class CommandLineTest(unittest.TestCase):
         [line] = errors.getvalue().splitlines()
         self.assertTrue(line.startswith("understory hil: "), line)
         return line
-
-    def test_a_network_is_an_open_file_and_an_address(self):
-        _, job = hil.parse(["--network", "1:10.0.0.1/24", "--", "true"])
-
-        self.assertEqual(job.network, Network(1, "10.0.0.1/24"))
-        for wrong in ("1", "999:10.0.0.1/24", "x:10.0.0.1/24", "1:10.0.0/24", "1:there"):
-            self.assertIn("--network", self.refused("--network", wrong, "--", "true"))
 
     def test_what_follows_the_first_two_dashes_is_the_command(self):
         _, job = hil.parse(["--interfaces", "2", "--", "git", "log", "--", "--wire"])

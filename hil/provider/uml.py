@@ -2,7 +2,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The provider that boots User-Mode Linux: a kernel as a process, with the host's files as root."""
 
-import ipaddress
 import os
 from pathlib import Path
 from typing import Dict, List, Optional
@@ -77,19 +76,9 @@ class Uml:
             "con0=null,fd:1",
             "ssl=null",
             f"ssl0=fd:{channel}",
-            *self._network(job),
             "quiet",
             *KernelRun.boot_arguments(job, folder, "/dev/ttyS0", MODULES),
         ]
-
-    @staticmethod
-    def _network(job: Job) -> List[str]:
-        if job.network is None:
-            return []
-        # A name of its own on the wire, from the address that is unique there.
-        address = ipaddress.ip_interface(job.network.address).ip.packed
-        card = "02:00:" + ":".join(f"{byte:02x}" for byte in address)
-        return [f"vec0:transport=fd,fd={job.network.socket},mac={card}"]
 
     def _environment(self, job: Job, folder: Path) -> Dict[str, str]:
         memory = memory_folder(job.memory_mib)

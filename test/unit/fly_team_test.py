@@ -6,10 +6,10 @@
 import argparse
 import contextlib
 import io
-import os
 import pathlib
-import socket
+import subprocess
 import sys
+import tempfile
 import unittest
 import unittest.mock
 
@@ -19,7 +19,6 @@ ROOT = pathlib.Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "src" / "understory_nodelets" / "onboard"))
 import fly  # noqa: E402
 from fly_team import least_separation_m, overrides_of, parse_kill  # noqa: E402
-from team_network import Ethernet  # noqa: E402
 
 
 class FlyTeam(unittest.TestCase):
@@ -61,70 +60,54 @@ class FlyTeam(unittest.TestCase):
             with self.assertRaisesRegex(ValueError, "--kill"):
                 parse_kill(wrong, 2)
 
-    def test_a_vehicle_in_its_own_kernel_is_told_all_that_the_team_was(self):
-        words = ["--team", "2", "--kill", "0@3", "--seed", "7", "--fault", "1:freeze", "--quiet"]
-        words += ["--fault", "2:resume", "--crop", "0,0,9,9"]
+    def test_a_rate_of_the_bus_is_told_to_both_ends(self):
+        arguments = fly.parse_arguments(["--bus", "vcan0", "--bus-rate", "50", "--no-bus-log"])
 
-        command = fly.booted_command(fly.parse_arguments(words), "/there", "5:10.0.0.1/24")
+        told = yaml.safe_load(fly.bus_override(arguments, pathlib.Path("/there")))
 
-        ours = command[: command.index("--")]
-        self.assertEqual(ours[-2:], ["--network", "5:10.0.0.1/24"])
-        told = fly.parse_arguments(command[command.index("--") + 3 :])
-        self.assertEqual((told.team, told.kill, told.out, told.bus), (1, [], "/there", "vcan0"))
-        self.assertEqual((told.seed, told.fault, told.crop), (7, ["1:freeze", "2:resume"], "0,0,9,9"))
-        self.assertTrue(told.quiet and told.no_report)
-        self.assertFalse(told.no_vehicle)
+        self.assertEqual(told, {"bus": {"interface": "vcan0"}, "flight": {"rate_hz": 50.0}})
+        with unittest.mock.patch.object(fly.subprocess, "Popen") as vehicle:
+            with tempfile.TemporaryDirectory() as folder:
+                vehicle.return_value.wait.side_effect = subprocess.TimeoutExpired("vehicle", 1.0)
+                fly.start_vehicle(arguments, pathlib.Path(folder))
+        [command] = vehicle.call_args[0]
+        self.assertEqual(command[command.index("--rate") + 1], "50.0")
+
+    def test_the_camera_has_its_size_and_rate_together(self):
+        arguments = fly.parse_arguments(["--camera-size", "80x60", "--camera-rate", "8"])
+
+        told = yaml.safe_load(fly.camera_override(arguments))
+
+        self.assertEqual(told, {"camera": {"width_px": 80, "height_px": 60, "rate_hz": 8.0}})
 
 
-class BootsKernels(unittest.TestCase):
-    def boots(self, provider, processors, *words):
-        """Whether kernels are booted, and which bus is taken then."""
+class ATeamInABootedKernel(unittest.TestCase):
+    def words(self, provider, *words):
+        """What is added, and which bus is taken."""
         arguments = fly.parse_arguments(list(words))
         with unittest.mock.patch.object(fly, "quickest_provider", lambda: provider):
-            with unittest.mock.patch.object(os, "cpu_count", lambda: processors):
-                with contextlib.redirect_stderr(io.StringIO()) as self.said:
-                    return fly.boots_kernels(arguments), arguments.bus
+            with contextlib.redirect_stderr(io.StringIO()) as self.said:
+                return fly.words_for_kernel(arguments), arguments.bus
 
-    def test_for_a_team_on_a_machine_that_has_no_can(self):
-        self.assertEqual(self.boots("uml", 4, "--team", "2"), (True, None))
-        self.assertEqual(self.boots("native", 4, "--team", "2"), (False, None))
-        self.assertEqual(self.boots("uml", 4), (False, None))
-        self.assertEqual(self.boots("uml", 4, "--team", "2", "--bus", "memory"), (False, "memory"))
-        self.assertEqual(self.said.getvalue(), "")
+    def test_two_share_it_at_lower_rates_which_is_said(self):
+        added = ["--bus-rate", "50", "--camera-rate", "8"]
 
-    def test_unless_it_is_too_small_which_is_said(self):
-        self.assertEqual(self.boots("uml", 2, "--team", "2"), (False, "memory"))
-        self.assertIn("2 processors are too few", self.said.getvalue())
+        self.assertEqual(self.words("uml", "--team", "2"), (added, None))
+        self.assertIn(" ".join(added), self.said.getvalue())
 
+    def test_what_the_user_wants_is_kept(self):
+        self.assertEqual(self.words("uml", "--team", "2", "--bus-rate", "100")[0], ["--camera-rate", "8"])
+        overrides = ["--overrides", "camera: {width_px: 80}"]
+        self.assertEqual(self.words("uml", "--team", "2", *overrides)[0], ["--bus-rate", "50"])
 
-class EthernetTest(unittest.TestCase):
-    def setUp(self):
-        self.ethernet = Ethernet(3)
-        self.addCleanup(self.ethernet.close)
-        self.cards = [socket.socket(fileno=os.dup(self.ethernet.file_of(i))) for i in range(3)]
-        for card in self.cards:
-            card.settimeout(10.0)
-            self.addCleanup(card.close)
-        self.ethernet.start()
+    def test_three_are_too_many_for_it_which_is_said(self):
+        self.assertEqual(self.words("uml", "--team", "3"), ([], "memory"))
+        self.assertIn("no time for 3", self.said.getvalue())
 
-    def test_a_frame_reaches_all_others_whole(self):
-        for frame in (b"first", bytes(1514)):
-            self.cards[1].send(frame)
-
-            self.assertEqual(self.cards[0].recv(65536), frame)
-            self.assertEqual(self.cards[2].recv(65536), frame)
-        self.cards[1].setblocking(False)
-        with self.assertRaises(BlockingIOError):
-            self.cards[1].recv(65536)
-
-    def test_one_that_is_gone_or_takes_nothing_holds_up_nobody(self):
-        self.cards[0].close()
-        for _ in range(2000):  # more than a socket holds
-            self.cards[1].send(b"frame")
-            self.assertEqual(self.cards[2].recv(65536), b"frame")
-
-    def test_addresses_differ(self):
-        self.assertEqual(len({Ethernet.address_of(number) for number in range(10)}), 10)
+    def test_where_none_is_booted_nothing_changes(self):
+        for provider, words in (("native", ["--team", "3"]), ("uml", []), ("", ["--team", "2"])):
+            self.assertEqual(self.words(provider, *words), ([], None))
+            self.assertEqual(self.said.getvalue(), "")
 
 
 if __name__ == "__main__":

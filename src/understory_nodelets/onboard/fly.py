@@ -4,8 +4,7 @@
 """Flies a mission in real time: a CAN bus, a vehicle on it, a ROS master, the onboard process with
 its live line, the report.
 
-Without --bus it runs itself again with a bus of its own (hil/provider); of a team each vehicle on
-one of its own kernel, if a kernel must be booted for it.
+Without --bus it runs itself again with a bus of its own (hil/provider), one for each vehicle.
 Exit status: that of the onboard process (0 completed without collision, 1 not so, 2 wrong use).
 """
 
@@ -29,7 +28,10 @@ STOP_PATIENCE_S = 30.0
 VEHICLE_PATIENCE_S = 1.0  # to find fault with its options and its bus
 MEMORY = "memory"
 OWN_BUS = "vcan0"
-PROCESSORS_PER_KERNEL = 2  # each needs one for itself, and the host another
+NATIVE = "native"  # the bus provider that boots no kernel
+# A booted kernel has one processor: more than these do not fly there, nor two at the full rates.
+MOST_IN_KERNEL = 2
+KERNEL_BUS_HZ, KERNEL_CAMERA_HZ = 50.0, 8.0
 MOST_VEHICLES = 10  # that find each other on one machine
 PROVIDER = Path(__file__).resolve().parents[3] / "hil/provider/hil.py"
 PASSED_ON = ("forest", "crop", "strategy", "speed-cap", "resume")
@@ -51,6 +53,7 @@ def parse_arguments(words: List[str]) -> argparse.Namespace:
     parser.add_argument("--seed", type=int, default=1, help="of everything random (default: 1)")
     parser.add_argument("--out", help="result folder (default: results/SCENARIO_SEED_onboard)")
     parser.add_argument("--camera-size", help="WxH of the simulated camera, in pixels")
+    parser.add_argument("--camera-rate", type=float, metavar="HZ", help="of the simulated camera")
     parser.add_argument("--overrides", default="", help="YAML over the scenario's keys")
     parser.add_argument(
         "--team", type=int, default=1, metavar="N",
@@ -66,6 +69,10 @@ def parse_arguments(words: List[str]) -> argparse.Namespace:
         "--bus",
         help="CAN interface to use as it is; memory: no CAN, a vehicle within the process "
         "(default: vcan0 on a bus of its own, as `understory hil` makes it)",
+    )
+    parser.add_argument(
+        "--bus-rate", type=float, metavar="HZ",
+        help="of setpoints and odometry on the bus (default: 100)",
     )
     parser.add_argument("--no-vehicle", action="store_true", help="there is one on the bus already")
     parser.add_argument("--no-bus-log", action="store_true", help="no bus.log in the result folder")
@@ -87,13 +94,17 @@ def parse_arguments(words: List[str]) -> argparse.Namespace:
     return parser.parse_args(words)
 
 
-def camera_override(size: Optional[str]) -> str:
-    if not size:
-        return ""
-    match = re.fullmatch(r"(\d+)x(\d+)", size)
-    if not match:
-        raise FlyError(f"--camera-size {size}: expected WIDTHxHEIGHT, such as 640x480")
-    return f"camera: {{width_px: {match[1]}, height_px: {match[2]}}}\n"
+def camera_override(arguments: argparse.Namespace) -> str:
+    keys = []
+    size = arguments.camera_size
+    if size:
+        match = re.fullmatch(r"(\d+)x(\d+)", size)
+        if not match:
+            raise FlyError(f"--camera-size {size}: expected WIDTHxHEIGHT, such as 640x480")
+        keys = [f"width_px: {match[1]}", f"height_px: {match[2]}"]
+    if arguments.camera_rate is not None:
+        keys.append(f"rate_hz: {arguments.camera_rate}")
+    return f"camera: {{{', '.join(keys)}}}\n" if keys else ""
 
 
 def is_master(uri: str) -> bool:
@@ -150,6 +161,7 @@ def start_vehicle(arguments: argparse.Namespace, folder: Path) -> subprocess.Pop
     command += ["--overrides", arguments.overrides] if arguments.overrides else []
     command += ["--forest", str(Path(arguments.forest).resolve())] if arguments.forest else []
     command += ["--crop", arguments.crop] if arguments.crop else []
+    command += ["--rate", str(arguments.bus_rate)] if arguments.bus_rate is not None else []
     for fault in arguments.fault:
         command += ["--fault", fault]
     log_path = folder / "vehicle.log"
@@ -176,7 +188,8 @@ def bus_override(arguments: argparse.Namespace, folder: Path) -> str:
     if arguments.bus == MEMORY:
         return ""
     log = "" if arguments.no_bus_log else f", log_file: '{folder / 'bus.log'}'"
-    return f"bus: {{interface: {arguments.bus}{log}}}\n"
+    rate = "" if arguments.bus_rate is None else f"flight: {{rate_hz: {arguments.bus_rate}}}\n"
+    return f"bus: {{interface: {arguments.bus}{log}}}\n{rate}"
 
 
 def with_own_bus(words: List[str], buses: int) -> NoReturn:
@@ -199,43 +212,24 @@ def quickest_provider() -> str:
     return next((words[0] for words in lines if words[1:] == ["works"]), "")
 
 
-def boots_kernels(arguments: argparse.Namespace) -> bool:
-    """Whether each vehicle of the team gets a kernel. Where the machine is too small for that, all
-    vehicles are within their processes."""
-    if arguments.bus is not None or arguments.team == 1 or quickest_provider() != "uml":
-        return False
-    processors = os.cpu_count() or 1
-    if processors >= PROCESSORS_PER_KERNEL * arguments.team:
-        return True
-    print(
-        f"understory fly: this kernel has no CAN, and {processors} processors are too few to boot "
-        f"{arguments.team} that have: --bus memory",
-        file=sys.stderr,
-    )
-    arguments.bus = MEMORY
-    return False
-
-
-def words_of(arguments: argparse.Namespace) -> List[str]:
-    """The command line that makes these arguments."""
-    words: List[str] = []
-    for name, value in vars(arguments).items():
-        option = f"--{name.replace('_', '-')}"
-        if value is True:
-            words.append(option)
-        elif isinstance(value, list):
-            words += [word for one in value for word in (option, one)]
-        elif value not in (None, False, ""):
-            words += [option, str(value)]
+def words_for_kernel(arguments: argparse.Namespace) -> List[str]:
+    """What to add for a team where a kernel must be booted for its buses. Of more vehicles than fly
+    there each is within its process."""
+    if arguments.team == 1 or quickest_provider() in ("", NATIVE):
+        return []
+    begin = "understory fly: this kernel has no CAN"
+    if arguments.team > MOST_IN_KERNEL:
+        print(f"{begin}, and a booted one has no time for {arguments.team}: --bus memory", file=sys.stderr)
+        arguments.bus = MEMORY
+        return []
+    words = []
+    for option, is_given, rate_hz in (
+        ("--bus-rate", arguments.bus_rate is not None, KERNEL_BUS_HZ),
+        ("--camera-rate", arguments.camera_rate or "camera:" in arguments.overrides, KERNEL_CAMERA_HZ),
+    ):
+        words += [] if is_given else [option, f"{rate_hz:g}"]
+    print(f"{begin}: both in a booted one, {' '.join(words)}", file=sys.stderr)
     return words
-
-
-def booted_command(arguments: argparse.Namespace, folder: Path, network: str) -> List[str]:
-    """Flies one vehicle of a team in a kernel of its own."""
-    arguments.team, arguments.kill = 1, []
-    arguments.bus, arguments.out, arguments.no_report = OWN_BUS, str(folder), True
-    command = ["/usr/bin/python3", "-B", str(PROVIDER), "--network", network, "--"]
-    return command + ["/usr/bin/python3", str(Path(__file__).resolve()), *words_of(arguments)]
 
 
 def stop(process: subprocess.Popen) -> None:
@@ -251,7 +245,7 @@ def stop(process: subprocess.Popen) -> None:
 def onboard_command(arguments: argparse.Namespace, folder: Path) -> List[str]:
     command = [arguments.onboard or "onboard", "--scenario", arguments.scenario]
     command += ["--seed", str(arguments.seed), "--result-folder", str(folder)]
-    overrides = camera_override(arguments.camera_size) + arguments.overrides
+    overrides = camera_override(arguments) + arguments.overrides
     command += ["--overrides", overrides] if overrides else []
     onboard = bus_override(arguments, folder) + (arguments.onboard_overrides or "")
     command += ["--onboard-overrides", onboard] if onboard else []
@@ -317,7 +311,7 @@ def check_team(arguments: argparse.Namespace) -> None:
         raise FlyError(str(error)) from error
 
 
-def fly(arguments: argparse.Namespace, boots: bool = False) -> int:
+def fly(arguments: argparse.Namespace) -> int:
     team = f"_team{arguments.team}" if arguments.team > 1 else ""
     name = f"{Path(arguments.scenario).stem}_{arguments.seed}{team}_onboard"
     folder = Path(arguments.out or Path("results") / name).resolve()
@@ -326,7 +320,7 @@ def fly(arguments: argparse.Namespace, boots: bool = False) -> int:
     except OSError as error:
         raise FlyError(f"{folder}: cannot be made: {error.strerror}") from error
     if arguments.team > 1:
-        return fly_team.fly_team(arguments, folder, sys.modules[__name__], boots)
+        return fly_team.fly_team(arguments, folder, sys.modules[__name__])
     command = onboard_command(arguments, folder)
     master, uri = None, arguments.master or os.environ.get("ROS_MASTER_URI", "")
     if arguments.master and not is_master(arguments.master):
@@ -354,10 +348,11 @@ def main() -> int:
     arguments = parse_arguments(sys.argv[1:])
     try:
         check_team(arguments)
-        boots = boots_kernels(arguments)
-        if arguments.bus is None and not boots:
-            with_own_bus(sys.argv[1:], arguments.team)
-        return fly(arguments, boots)
+        if arguments.bus is None:
+            words = words_for_kernel(arguments)
+        if arguments.bus is None:
+            with_own_bus([*words, *sys.argv[1:]], arguments.team)
+        return fly(arguments)
     except FlyError as error:
         print(f"understory fly: {error}", file=sys.stderr)
         return 2

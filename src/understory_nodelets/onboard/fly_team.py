@@ -1,13 +1,11 @@
 # Copyright 2026 the Understory authors
 # SPDX-License-Identifier: BSD-3-Clause
 """A team in real time on one machine: for each vehicle a ROS master, an onboard process and, on a
-bus of its own, a vehicle; between them DDS on the loopback interface. Where a kernel must be booted
-for a bus, each vehicle has a kernel, and DDS goes over an Ethernet between them.
+bus of its own, a vehicle; between them DDS on the loopback interface.
 """
 
 import argparse
 import bisect
-import contextlib
 import copy
 import csv
 import json
@@ -22,10 +20,7 @@ import time
 from pathlib import Path
 from typing import Dict, List, Optional, Sequence, Tuple
 
-import team_network
-
 SHOW_S = 1.0
-KERNEL_PATIENCE_S = 10.0  # of who has booted one that was killed
 LEFT_BEHIND_S = 45.0  # after an interrupt; then what still runs is killed
 DDS_PORT = 7400  # of domain 0; each further domain is DDS_PORTS higher
 DDS_PORTS = 250
@@ -93,7 +88,6 @@ class Mate:
         self.uri = ""
         self.onboard: Optional[subprocess.Popen] = None
         self.helpers: List[subprocess.Popen] = []  # its vehicle, its master
-        self.is_booted = False  # then the onboard process is the bus provider, with all in it
         self.is_killed = False
 
     def is_running(self) -> bool:
@@ -117,10 +111,6 @@ class Mate:
     def kill(self) -> None:
         """As if its battery had come off: nothing of it says another word."""
         self.is_killed = True
-        if self.is_booted and self.is_running() and self.onboard is not None:
-            team_network.kill_children(self.onboard.pid)
-            with contextlib.suppress(subprocess.TimeoutExpired):
-                self.onboard.wait(KERNEL_PATIENCE_S)
         for process in [self.onboard, *self.helpers]:
             if process is not None and process.poll() is None:
                 process.kill()
@@ -200,43 +190,24 @@ def overrides_of(arguments: argparse.Namespace, number: int) -> str:
 
 
 class Team:
-    def __init__(self, arguments: argparse.Namespace, folder: Path, tools, boots: bool) -> None:
+    def __init__(self, arguments: argparse.Namespace, folder: Path, tools) -> None:
         self.arguments = arguments
         self.tools = tools  # of fly.py: what one vehicle needs
         self.mates = [Mate(number, folder / f"vehicle_{number}") for number in range(arguments.team)]
         self.kills = [parse_kill(text, arguments.team) for text in arguments.kill]
         self.interrupts = 0
         self.interrupted_at = 0.0
-        team = f"fly_{os.getpid()}"
-        self.ethernet = team_network.Ethernet(len(self.mates)) if boots else None
         self.dds = (
-            f"dds: {{domain: 1, team: {team}, interface: {team_network.CARD}}}\n"
-            if boots
-            else f"dds: {{domain: {free_domain()}, team: {team}, interface: lo, multicast: false, "
-            "peers: '127.0.0.1'}\n"
+            f"dds: {{domain: {free_domain()}, team: fly_{os.getpid()}, interface: lo, "
+            "multicast: false, peers: '127.0.0.1'}\n"
         )
 
     def start(self) -> None:
+        """What takes the least time of the machine first: so none waits long for another."""
         for mate in self.mates:
             mate.folder.mkdir(parents=True, exist_ok=True)
             for name in ("ticks.csv", "start.json", "result.json"):
                 (mate.folder / name).unlink(missing_ok=True)  # of a flight before
-        if self.ethernet is None:
-            self._start_all()
-        else:
-            self._boot_all(self.ethernet)
-
-    def _boot_all(self, ethernet: team_network.Ethernet) -> None:
-        for mate in self.mates:
-            mate.is_booted = True
-            network = f"{ethernet.file_of(mate.number)}:{ethernet.address_of(mate.number)}"
-            told = self._arguments_of(mate.number)
-            command = self.tools.booted_command(told, mate.folder, network)
-            self._start_onboard(mate, command, (ethernet.file_of(mate.number),))
-        ethernet.start()
-
-    def _start_all(self) -> None:
-        """What takes the least time of the machine first: so none waits long for another."""
         for mate in self.mates:
             master, mate.uri = self.tools.start_master(mate.folder / "master.log")
             mate.helpers.append(master)
@@ -258,7 +229,7 @@ class Team:
         return arguments
 
     @staticmethod
-    def _start_onboard(mate: Mate, command: List[str], files: Tuple[int, ...] = ()) -> None:
+    def _start_onboard(mate: Mate, command: List[str]) -> None:
         environment = {**os.environ, "ROS_MASTER_URI": mate.uri}
         environment.setdefault("ROS_IP", "127.0.0.1")
         environment.setdefault("ROSCONSOLE_FORMAT", "${message}")
@@ -270,7 +241,6 @@ class Team:
                 stdout=log,
                 stderr=subprocess.STDOUT,
                 start_new_session=True,
-                pass_fds=files,
             )
 
     def on_signal(self, number: int, _frame) -> None:
@@ -313,8 +283,6 @@ class Team:
             for process in [mate.onboard, *mate.helpers]:
                 if process is not None:
                     self.tools.stop(process)
-        if self.ethernet is not None:
-            self.ethernet.close()
 
     def summary(self) -> int:
         """Says what came of it; the exit status of the team."""
@@ -341,8 +309,8 @@ class Team:
         return status
 
 
-def fly_team(arguments: argparse.Namespace, folder: Path, tools, boots: bool) -> int:
-    team = Team(arguments, folder, tools, boots)
+def fly_team(arguments: argparse.Namespace, folder: Path, tools) -> int:
+    team = Team(arguments, folder, tools)
     try:
         team.start()
         team.fly()
