@@ -14,6 +14,7 @@ import unittest
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "src" / "understory_sim" / "report"))
 import report  # noqa: E402
+import team_time  # noqa: E402
 
 TICKS = (
     "time_s,x_m,y_m,z_m,vx_mps,vy_mps,vz_mps,speed_mps,yaw_rad,yaw_rate_radps,mode,mission_state,"
@@ -53,7 +54,7 @@ class TeamReport(unittest.TestCase):
         for number in (0, 1):
             self.assertIn(f'href="vehicle_{number}/report.html"', page)
             self.assertTrue((self.folder / f"vehicle_{number}" / "report.html").exists())
-        for name in ("team_path.png", "team_volume.png"):
+        for name in ("team_path.png", "team_volume.png", "team_time.png"):
             self.assertEqual((self.folder / name).read_bytes()[:4], b"\x89PNG")
 
     def test_a_collision_is_not_good(self):
@@ -68,6 +69,32 @@ class TeamReport(unittest.TestCase):
         with contextlib.redirect_stderr(said):
             self.assertEqual(report.main([str(self.folder)]), 2)
         self.assertIn("vehicle_1/ticks.csv:1: no column", said.getvalue())
+
+    def test_all_the_time_until_the_last_is_down_is_put_to_some_use(self):
+        flown = [
+            "0.0,brake,take_off,0.0",
+            "1.0,explorer,explore,1.5",
+            "3.0,collector,explore,2.0",
+            "7.0,collector,explore,0.05",
+            "15.0,transit,meet,1.0",
+            "21.0,transit,return_home,1.0",
+            "31.0,transit,land,0.2",
+        ]
+        rows = [line.split(",") for line in flown]
+        for number, end in ((0, len(rows)), (1, 2)):
+            text = "".join(
+                f"{t},0,0,1,1,0,0,{v},0,0,{mode},{state},0.1,1,3,1,0,,,,,2.0\n"
+                for t, mode, state, v in rows[:end]
+            )
+            (self.folder / f"vehicle_{number}" / "ticks.csv").write_text(TICKS + text)
+        said = io.StringIO()
+
+        with contextlib.redirect_stdout(said):
+            self.assertEqual(team_time.main([str(self.folder)]), 0)
+
+        means = [float(cell) for cell in said.getvalue().splitlines()[-1].split("|")[2:-1]]
+        self.assertEqual(means, [1.0, 2.0, 4.0, 3.0, 6.0, 15.0])
+        self.assertEqual(sum(means), 31.0)
 
 
 if __name__ == "__main__":

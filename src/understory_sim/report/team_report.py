@@ -15,11 +15,13 @@ from matplotlib.patches import Circle
 
 from look import BLUE, GREEN, INK, ORANGE, PINK, RED, SKY, STYLE, TRUNK
 from result_folder import ResultFolder, read_result_folder
+from team_time import draw_times
 
 COLOURS = [BLUE, ORANGE, GREEN, PINK, SKY, RED]
 CAPTIONS = {
     "team_path": "The flown paths over the true trunks; triangles: starts, squares: ends.",
     "team_volume": "What each vehicle knows of the team's map (solid) over time.",
+    "team_time": "Where the time of each vehicle went, until the last one was down.",
 }
 
 
@@ -68,8 +70,13 @@ def draw_volumes(members: List[Tuple[str, ResultFolder]]) -> Figure:
 
 
 def all_figures(members: List[Tuple[str, ResultFolder]]):
+    names = [name.replace("_", " ") for name, _ in members]
     with pyplot.rc_context(STYLE):
-        return {"team_path": draw_paths(members), "team_volume": draw_volumes(members)}
+        return {
+            "team_path": draw_paths(members),
+            "team_volume": draw_volumes(members),
+            "team_time": draw_times(names, [folder for _, folder in members]),
+        }
 
 
 def _cell(mate: dict, key: str, digits: int) -> str:
