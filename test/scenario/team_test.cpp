@@ -123,6 +123,20 @@ TEST(Team, AfterARadioCutTheMapsAgreeAgain) {
   EXPECT_EQ(team::digest_of(run->map_of(0)), team::digest_of(run->map_of(1)));
 }
 
+// Parts so long that both are out of range for more than a minute.
+TEST(Team, OutOfRangeTheyMeetAtHomeInsteadOfExploringAllOfItTwice) {
+  SimulationConfig config = team_scene(2, 24.0, 14.0);
+  config.radio.range_m = 6.0;
+  config.mission.time_limit_s = 600.0;
+
+  const std::unique_ptr<TeamRun> met = flown(config, 3);
+  config.explorer.team.coordination.meeting_wait_s = 0.0;
+  const std::unique_ptr<TeamRun> not_met = flown(config, 3);
+
+  expect_good(*met);
+  EXPECT_LT(*met->result().completion_time_s, 0.8 * *not_met->result().completion_time_s);
+}
+
 TEST(Team, ThreeVehiclesStayApartOverManyForests) {
   for (std::uint64_t seed = 1; seed <= 6; ++seed) {
     const std::unique_ptr<TeamRun> run = flown(team_scene(3, 8.0, 6.0), seed);

@@ -72,7 +72,7 @@ TEST(TeamRejection, RejectsValuesThatThereAreNot) {
   mode.mode = static_cast<FlightMode>(4);
   expect_rejected(state_of(1, mode), Rejection::kMalformed);
   StateSample mission = state_sample(1);
-  mission.state = static_cast<MissionState>(8);
+  mission.state = static_cast<MissionState>(9);
   expect_rejected(state_of(1, mission), Rejection::kMalformed);
   StateSample stamp = state_sample(1);
   stamp.stamp = Time(Duration(std::numeric_limits<std::int64_t>::max()));

@@ -118,6 +118,12 @@ bool Explorer::has_open_clusters() const {
       });
 }
 
+bool Explorer::is_abroad() const {
+  return config_.team.coordination.own_region && target_ &&
+         !team::region_of(config_.team, geometry_.box_m())
+              .contains(target_->candidate.cluster->mean_m);
+}
+
 // Takes what is flown far longer than the rest of the way should? A plan made in fast flight may;
 // one made from what is slow by now will not.
 bool Explorer::is_sluggish(const Pilot& pilot, Time now) const {

@@ -55,6 +55,10 @@ class Explorer {
   [[nodiscard]] bool has_open_clusters() const;
   [[nodiscard]] const std::vector<ClusterPtr>& clusters() const { return finder_.clusters(); }
   [[nodiscard]] const std::optional<Target>& target() const { return target_; }
+  // Has it turned to another vehicle's part of the box?
+  [[nodiscard]] bool is_abroad() const;
+  // What it was flying to is no longer its aim; the next step() finds another.
+  void forget_target() { target_.reset(); }
   [[nodiscard]] FlightMode mode() const { return mode_; }
   [[nodiscard]] const ExplorerCounters& counters() const { return counters_; }
   [[nodiscard]] const SetAsideList& set_aside() const { return set_aside_; }

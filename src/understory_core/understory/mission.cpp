@@ -44,6 +44,8 @@ const char* to_string(MissionState state) {
       return "land";
     case MissionState::kStopped:
       return "stopped";
+    case MissionState::kMeet:
+      return "meet";
   }
   return "?";
 }
@@ -92,6 +94,7 @@ Mission::Mission(const MissionConfig& config,
       explorer_config_(explorer),
       pilot_(explorer.plan, duration_from_seconds(explorer.replan.lead_s)),
       explorer_(explorer, geometry),
+      meeting_(explorer.team.coordination),
       home_m_(home_m),
       home_yaw_rad_(yaw_rad),
       state_(config.auto_start ? MissionState::kTakeOff : MissionState::kWaiting),
@@ -150,7 +153,8 @@ bool Mission::start(Time now) {
 
 Mission::Answer Mission::pause(Time now) {
   const bool is_pausable = state_ == MissionState::kTakeOff || state_ == MissionState::kExplore ||
-                           state_ == MissionState::kReturnHome || state_ == MissionState::kDescend;
+                           state_ == MissionState::kReturnHome ||
+                           state_ == MissionState::kDescend || state_ == MissionState::kMeet;
   if (!is_pausable) {
     return {};
   }
@@ -190,7 +194,8 @@ void Mission::withdraw(const TrajectoryPtr& trajectory) {
 
 // In these states nobody else checks what is being flown against the newest map.
 bool Mission::is_flying_unwatched() const {
-  return state_ != MissionState::kExplore && state_ != MissionState::kReturnHome;
+  return state_ != MissionState::kExplore && state_ != MissionState::kReturnHome &&
+         state_ != MissionState::kMeet;
 }
 
 // Straight there; null and counted when there is no checked trajectory.
@@ -263,10 +268,12 @@ std::vector<Vector3d> Mission::route_home(Time now) {
   return routes.route_m(home);
 }
 
+bool Mission::is_home(Time now) const {
+  return (pilot_.next_start_point(now).position_m - home_m_).head<2>().norm() < kArrivedM;
+}
+
 TrajectoryPtr Mission::fly_home(Time now) {
-  const TrajectoryPoint here = pilot_.next_start_point(now);
-  const bool is_home = (here.position_m - home_m_).head<2>().norm() < kArrivedM;
-  if (strikes_ >= kMaxStrikes || (pilot_.is_at_rest(now) && is_home)) {
+  if (strikes_ >= kMaxStrikes || (pilot_.is_at_rest(now) && is_home(now))) {
     state_ = MissionState::kDescend;
     strikes_ = 0;
     return nullptr;
@@ -299,6 +306,24 @@ TrajectoryPtr Mission::fly_home(Time now) {
   return leg;
 }
 
+// Over once somebody has been heard, or has been waited for.
+TrajectoryPtr Mission::meet(Time now) {
+  if (!meeting_.is_wanted()) {
+    state_ = MissionState::kExplore;
+    return nullptr;
+  }
+  TrajectoryPtr leg = fly_home(now);
+  if (state_ == MissionState::kDescend) {
+    state_ = MissionState::kMeet;
+    if (is_home(now)) {
+      meeting_.wait(now);
+    } else {
+      meeting_.give_up();  // there is no way
+    }
+  }
+  return leg;
+}
+
 TrajectoryPtr Mission::descend(Time now) {
   if (!pilot_.is_at_rest(now)) {
     return nullptr;
@@ -320,6 +345,7 @@ TrajectoryPtr Mission::descend(Time now) {
 void Mission::set_peers(const team::Peers& peers, Time now) {
   pilot_.set_traffic(team::traffic_of(explorer_config_.team, peers, now));
   explorer_.set_peers(peers);
+  meeting_.observe(peers, pilot_.follower().newest()->sample(now).position_m, now);
   explorer_.avoid(pilot_.barriers(now));
 }
 
@@ -344,7 +370,17 @@ MissionStep Mission::on_map(const MapSnapshotPtr& snapshot, Time now) {
     case MissionState::kTakeOff:
       step.published = climb(now);
       break;
+    case MissionState::kMeet:
+      step.published = meet(now);
+      break;
     case MissionState::kExplore:
+      if (meeting_.is_wanted() && explorer_.is_abroad()) {
+        explorer_.forget_target();
+        strikes_ = 0;
+        state_ = MissionState::kMeet;
+        step.published = meet(now);
+        break;
+      }
       step.explore = explorer_.step(pilot_, now);
       step.published = explore(step.explore, now);
       break;

@@ -10,6 +10,7 @@
 #include <cstdint>
 
 #include "understory/explorer.hpp"
+#include "understory/team/meeting.hpp"
 
 namespace understory {
 
@@ -43,7 +44,8 @@ enum class MissionState : std::uint8_t {
   kReturnHome,
   kDescend,
   kLand,
-  kStopped
+  kStopped,
+  kMeet,  // at home or on the way there, to meet team mates; then it explores on
 };
 [[nodiscard]] const char* to_string(MissionState state);
 
@@ -119,7 +121,9 @@ class Mission {
   TrajectoryPtr explore(const ExploreStep& step, Time now);
   void resume_at_home();
   [[nodiscard]] std::vector<Vector3d> route_home(Time now);
+  [[nodiscard]] bool is_home(Time now) const;
   TrajectoryPtr fly_home(Time now);
+  TrajectoryPtr meet(Time now);
   TrajectoryPtr descend(Time now);
   TrajectoryPtr fly_leg(const Vector3d& to_m, Time now);
 
@@ -127,6 +131,7 @@ class Mission {
   ExplorerConfig explorer_config_;
   Pilot pilot_;
   Explorer explorer_;
+  team::Meeting meeting_;
   Vector3d home_m_;
   double home_yaw_rad_;
   bool has_map_ = false;  // without one nothing but rest is flown

@@ -99,7 +99,7 @@ std::optional<FlightMode> mode_of(std::uint32_t mode) {
 }
 
 std::optional<MissionState> mission_of(std::uint32_t state) {
-  return state <= static_cast<std::uint32_t>(MissionState::kStopped)
+  return state <= static_cast<std::uint32_t>(MissionState::kMeet)
              ? std::optional(static_cast<MissionState>(state))
              : std::nullopt;
 }

@@ -51,6 +51,7 @@ struct CoordinationConfig {
   double outer_radius_m = 5.0;
   bool own_region = true;
   double foreign_cost_m = 100.0;
+  double meeting_wait_s = 60.0;
   bool split_map = false;
   double claim_weight = 0.0;
 
@@ -76,6 +77,12 @@ struct CoordinationConfig {
         in_range(0.0, 1e4),
         "its own part is finished first, unless what is left of it is so much further away; not "
         "in the paper");
+    f.field(
+        "meeting_wait_s",
+        meeting_wait_s,
+        in_range(0.0, 3600.0),
+        "who has finished its own part waits at home for so long for team mates that are out of "
+        "range; 0: never; not in the paper");
     f.field("split_map", split_map, "and never leaves it, as with a map split beforehand");
     f.field("claim_weight",
             claim_weight,

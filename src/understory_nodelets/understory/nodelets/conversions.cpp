@@ -141,7 +141,7 @@ understory_msgs::MissionStatus to_msg(const MissionStatus& status) {
 
 std::optional<MissionStatus> from_msg(const understory_msgs::MissionStatus& msg) {
   using Msg = understory_msgs::MissionStatus;
-  if (msg.state > Msg::STOPPED || msg.stop_reason > Msg::TRACKING_LOST ||
+  if (msg.state > Msg::MEET || msg.stop_reason > Msg::TRACKING_LOST ||
       msg.mode > static_cast<std::uint8_t>(FlightMode::kBrake) ||
       msg.counter_names.size() != msg.counter_values.size()) {
     return std::nullopt;

@@ -60,7 +60,7 @@ team::Peer to_peer(const understory_msgs::TeamPeer& msg) {
 
 bool makes_sense(const understory_msgs::TeamPeer& msg) {
   const team::Peer peer = to_peer(msg);
-  return msg.state <= understory_msgs::MissionStatus::STOPPED &&
+  return msg.state <= understory_msgs::MissionStatus::MEET &&
          msg.mode <= understory_msgs::Trajectory::BRAKE && peer.position_m.allFinite() &&
          peer.velocity_mps.allFinite() && std::isfinite(peer.yaw_rad) &&
          (!peer.target_m || peer.target_m->allFinite());
