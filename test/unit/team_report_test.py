@@ -78,7 +78,8 @@ class TeamReport(unittest.TestCase):
             "7.0,collector,explore,0.05",
             "15.0,transit,meet,1.0",
             "21.0,transit,return_home,1.0",
-            "31.0,transit,land,0.2",
+            "29.0,transit,land,0.2",
+            "31.0,transit,land,0.0",
         ]
         rows = [line.split(",") for line in flown]
         for number, end in ((0, len(rows)), (1, 2)):
@@ -93,7 +94,7 @@ class TeamReport(unittest.TestCase):
             self.assertEqual(team_time.main([str(self.folder)]), 0)
 
         means = [float(cell) for cell in said.getvalue().splitlines()[-1].split("|")[2:-1]]
-        self.assertEqual(means, [1.0, 2.0, 4.0, 3.0, 6.0, 15.0])
+        self.assertEqual(means, [1.0, 2.0, 4.0, 3.0, 5.0, 16.0])
         self.assertEqual(sum(means), 31.0)
 
 

@@ -24,8 +24,8 @@ USES = {
     "as Collector": GREEN,
     "standing": ORANGE,  # turns, waits for its camera or for another vehicle
     "meeting": PINK,  # at home, and on the way there
-    "home and down": SKY,
-    "finished first": TRUNK,  # while another was still at it
+    "up and home": SKY,
+    "down": TRUNK,  # while another was still at it
 }
 
 
@@ -43,8 +43,9 @@ def time_use(ticks: Dict[str, np.ndarray], team_end_s: float) -> Dict[str, float
     used["as Collector"] = step_s[explores & ~stands & collects].sum()
     used["standing"] = step_s[explores & stands].sum()
     used["meeting"] = step_s[meets].sum()
-    used["home and down"] = step_s[~explores & ~meets].sum()
-    used["finished first"] = team_end_s - ticks["time_s"][-1]
+    is_down = np.isin(ticks["mission_state"][:-1], ["land", "stopped"])
+    used["up and home"] = step_s[~explores & ~meets & ~is_down].sum()
+    used["down"] = step_s[is_down].sum() + team_end_s - ticks["time_s"][-1]
     return used
 
 
