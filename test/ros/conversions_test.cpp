@@ -160,7 +160,7 @@ TEST(MissionStatusMessage, ComesBackAsItWas) {
 TEST(MissionStatusMessage, WithUnknownEnumeratorsIsRefused) {
   const understory_msgs::MissionStatus good = to_msg(MissionStatus());
   understory_msgs::MissionStatus msg = good;
-  msg.state = 8;
+  msg.state = understory_msgs::MissionStatus::MEET + 1;
   EXPECT_FALSE(from_msg(msg));
   msg = good;
   msg.stop_reason = understory_msgs::MissionStatus::TRACKING_LOST + 1;

@@ -5,8 +5,9 @@
 
 The two cannot agree exactly: onboard, exposures fall on the 100 Hz grid of the odometry, decisions
 take time, and threads run in another order each time, so targets differ after a few seconds. One
-onboard flight scatters by several percent; where the first one is outside, a second one joins the
-mean. A machine that stands still for long ends a flight safely before its time, or makes it longer;
+flight scatters by several percent, in lockstep too, between settings that hardly differ: there the
+mean of several is taken, which begin with another heading; onboard, where the mean so far is
+outside, another flight joins it. A machine that stands still for long ends a flight safely before its time, or makes it longer;
 such a one does not count.
 """
 
@@ -18,6 +19,7 @@ import sys
 import tempfile
 import unittest
 from pathlib import Path
+from statistics import mean
 
 import rospy
 import rostest
@@ -29,6 +31,8 @@ from machine import Never, attempted  # noqa: E402  pylint: disable=wrong-import
 SCENARIO = "small"
 TOLERANCE = 0.15
 FLIGHT_PATIENCE_S = 150
+HEADINGS_RAD = [0.01 * step for step in range(8)]
+MOST_ONBOARD = 3
 
 
 def program(package, name):
@@ -70,9 +74,10 @@ class Sameness(unittest.TestCase):
         self.assertGreaterEqual(result["coverage"], 0.99)
         return result["completion_time_s"]
 
-    def in_lockstep(self):
+    def in_lockstep(self, heading_rad):
         folder = self.folder / "lockstep"
         command = [program("understory_sim", "understory_simulate"), "--scenario", SCENARIO]
+        command += ["--set", f"scene: {{start: {{yaw_rad: {heading_rad}}}}}"]
         return self.completed(
             command + ["--quiet", "--no-report", "--out", str(folder)], folder
         )
@@ -93,12 +98,12 @@ class Sameness(unittest.TestCase):
         return attempted(fly, (AssertionError, OSError, ValueError, subprocess.TimeoutExpired))
 
     def test_completion_times_agree(self):
-        lockstep_s = self.in_lockstep()
+        lockstep_s = mean(self.in_lockstep(heading_rad) for heading_rad in HEADINGS_RAD)
         times_s = [self.onboard(lockstep_s)]
-        if not is_near(times_s[0], lockstep_s):
+        while not is_near(mean(times_s), lockstep_s) and len(times_s) < MOST_ONBOARD:
             times_s.append(self.onboard(lockstep_s))
 
-        mean_s = sum(times_s) / len(times_s)
+        mean_s = mean(times_s)
 
         print(f"lockstep {lockstep_s:.1f} s, onboard {times_s} s, ratio {mean_s / lockstep_s:.3f}")
         self.assertTrue(is_near(mean_s, lockstep_s))
