@@ -29,7 +29,8 @@ ONBOARD = WORKSPACE / "lib" / "understory_nodelets" / "onboard"
 VEHICLE = WORKSPACE / "lib" / "understory_hil" / "understory_vehicle"
 FLY = TREE / "src" / "understory_nodelets" / "onboard" / "fly.py"
 # As fly.py does it where a kernel is booted: its processor is shared by all.
-LITTLE = ["--bus-rate", "50", "--camera-rate", "8", "--camera-size", "160x120"]
+LITTLE = ["--bus-rate", "40", "--camera-rate", "5", "--camera-size", "160x120"]
+LITTLE += ["--overrides", "replan: {lead_s: 0.5}"]
 PATIENCE_S = 110.0
 STOP_PATIENCE_S = 60.0
 SAFETY_DISTANCE_M = 0.8

@@ -90,15 +90,19 @@ class ATeamInABootedKernel(unittest.TestCase):
                 return fly.words_for_kernel(arguments), arguments.bus
 
     def test_two_share_it_at_lower_rates_which_is_said(self):
-        added = ["--bus-rate", "50", "--camera-rate", "8"]
+        added = ["--bus-rate", "40", "--camera-rate", "5", "--overrides", fly.KERNEL_LEAD]
 
         self.assertEqual(self.words("uml", "--team", "2"), (added, None))
         self.assertIn(" ".join(added), self.said.getvalue())
 
     def test_what_the_user_wants_is_kept(self):
-        self.assertEqual(self.words("uml", "--team", "2", "--bus-rate", "100")[0], ["--camera-rate", "8"])
-        overrides = ["--overrides", "camera: {width_px: 80}"]
-        self.assertEqual(self.words("uml", "--team", "2", *overrides)[0], ["--bus-rate", "50"])
+        replan = ["--overrides", "replan: {lead_s: 0.2}"]
+        added, _ = self.words("uml", "--team", "2", "--bus-rate", "100", *replan)
+        self.assertEqual(added, ["--camera-rate", "5"])
+        added, _ = self.words("uml", "--team", "2", "--overrides", "camera: {width_px: 80}")
+        self.assertEqual(added[:3], ["--bus-rate", "40", "--overrides"])
+        self.assertEqual(yaml.safe_load(added[3])["camera"], {"width_px": 80})
+        self.assertEqual(yaml.safe_load(added[3])["replan"], {"lead_s": 0.5})
 
     def test_three_are_too_many_for_it_which_is_said(self):
         self.assertEqual(self.words("uml", "--team", "3"), ([], "memory"))

@@ -31,7 +31,9 @@ OWN_BUS = "vcan0"
 NATIVE = "native"  # the bus provider that boots no kernel
 # A booted kernel has one processor: more than these do not fly there, nor two at the full rates.
 MOST_IN_KERNEL = 2
-KERNEL_BUS_HZ, KERNEL_CAMERA_HZ = 50.0, 8.0
+KERNEL_BUS_HZ, KERNEL_CAMERA_HZ = 40.0, 5.0
+# Two decide at once there: what is decided late must still be in time.
+KERNEL_LEAD = "replan: {lead_s: 0.5}"
 MOST_VEHICLES = 10  # that find each other on one machine
 PROVIDER = Path(__file__).resolve().parents[3] / "hil/provider/hil.py"
 PASSED_ON = ("forest", "crop", "strategy", "speed-cap", "resume")
@@ -228,6 +230,8 @@ def words_for_kernel(arguments: argparse.Namespace) -> List[str]:
         ("--camera-rate", arguments.camera_rate or "camera:" in arguments.overrides, KERNEL_CAMERA_HZ),
     ):
         words += [] if is_given else [option, f"{rate_hz:g}"]
+    if "replan:" not in arguments.overrides:
+        words += ["--overrides", "\n".join(filter(None, [arguments.overrides, KERNEL_LEAD]))]
     print(f"{begin}: both in a booted one, {' '.join(words)}", file=sys.stderr)
     return words
 
@@ -351,7 +355,7 @@ def main() -> int:
         if arguments.bus is None:
             words = words_for_kernel(arguments)
         if arguments.bus is None:
-            with_own_bus([*words, *sys.argv[1:]], arguments.team)
+            with_own_bus([*sys.argv[1:], *words], arguments.team)
         return fly(arguments)
     except FlyError as error:
         print(f"understory fly: {error}", file=sys.stderr)
