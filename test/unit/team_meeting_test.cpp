@@ -21,7 +21,7 @@ Peer mate_at(double x_m, bool in_contact) {
 
 // The vehicle itself hovers at the origin.
 struct Silence {
-  explicit Silence(double wait_s = 60.0) : config(config_with(wait_s)), meeting(config) {}
+  explicit Silence(double wait_s = 60.0) : meeting(config_with(wait_s)) {}
 
   static CoordinationConfig config_with(double wait_s) {
     CoordinationConfig config;
@@ -34,7 +34,6 @@ struct Silence {
     meeting.observe(peers, {0.0, 0.0, 1.0}, at_s(time_s));
   }
 
-  CoordinationConfig config;
   Meeting meeting;
 };
 
@@ -62,6 +61,8 @@ TEST(Meeting, IsNotWantedWithWhoFellSilentNearBy) {
 TEST(Meeting, IsNotWantedWithWhoIsInContactOrWasNeverHeard) {
   Silence silence;
   silence.observe({}, 500.0);
+  EXPECT_FALSE(silence.meeting.is_wanted());
+  silence.hear_nothing(550.0);  // others have heard it, or somebody did before this began
   EXPECT_FALSE(silence.meeting.is_wanted());
   silence.hear(14.0, 600.0);
   EXPECT_FALSE(silence.meeting.is_wanted());

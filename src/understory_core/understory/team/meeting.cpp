@@ -14,25 +14,24 @@ constexpr double kEdge = 0.7;
 
 }  // namespace
 
-Meeting::Meeting(const CoordinationConfig& config) : config_(config) {}
+Meeting::Meeting(const CoordinationConfig& config) : wait_s_(config.meeting_wait_s) {}
 
 bool Meeting::is_awaited(const Mate& mate, Time now) const {
-  return !mate.was_awaited && mate.last_distance_m >= kEdge * farthest_m_ &&
+  return wait_s_ > 0.0 && !mate.was_awaited && mate.last_distance_m >= kEdge * farthest_m_ &&
          to_seconds(now - mate.last_heard) >= kLatelyS;
 }
 
 void Meeting::observe(const Peers& peers, const Vector3d& own_position_m, Time now) {
   is_wanted_ = false;
   for (const Peer& peer : peers) {
-    Mate& mate = mates_[peer.id];
     if (peer.in_contact) {
-      mate = {(peer.position_m - own_position_m).norm(), now, false};
-      farthest_m_ = std::max(farthest_m_, mate.last_distance_m);
-    } else {
-      is_wanted_ = is_wanted_ || is_awaited(mate, now);
+      const double distance_m = (peer.position_m - own_position_m).norm();
+      mates_[peer.id] = {distance_m, now, false};
+      farthest_m_ = std::max(farthest_m_, distance_m);
+    } else if (const auto mate = mates_.find(peer.id); mate != mates_.end()) {
+      is_wanted_ = is_wanted_ || is_awaited(mate->second, now);
     }
   }
-  is_wanted_ = is_wanted_ && config_.meeting_wait_s > 0.0;
   if (!is_wanted_) {
     waits_since_.reset();
   }
@@ -40,7 +39,7 @@ void Meeting::observe(const Peers& peers, const Vector3d& own_position_m, Time n
 
 void Meeting::wait(Time now) {
   waits_since_ = waits_since_.value_or(now);
-  if (to_seconds(now - *waits_since_) >= config_.meeting_wait_s) {
+  if (to_seconds(now - *waits_since_) >= wait_s_) {
     give_up();
   }
 }

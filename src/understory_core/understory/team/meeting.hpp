@@ -42,7 +42,7 @@ class Meeting {
 
   [[nodiscard]] bool is_awaited(const Mate& mate, Time now) const;
 
-  CoordinationConfig config_;
+  double wait_s_;
   std::map<int, Mate> mates_;  // that have been heard, by id
   double farthest_m_ = 0.0;    // that anybody was heard
   std::optional<Time> waits_since_;
