@@ -26,56 +26,6 @@ int strikes_of(PlanError error) {
 
 }  // namespace
 
-const char* to_string(MissionState state) {
-  switch (state) {
-    case MissionState::kWaiting:
-      return "waiting";
-    case MissionState::kPaused:
-      return "paused";
-    case MissionState::kTakeOff:
-      return "take_off";
-    case MissionState::kExplore:
-      return "explore";
-    case MissionState::kReturnHome:
-      return "return_home";
-    case MissionState::kDescend:
-      return "descend";
-    case MissionState::kLand:
-      return "land";
-    case MissionState::kStopped:
-      return "stopped";
-    case MissionState::kMeet:
-      return "meet";
-  }
-  return "?";
-}
-
-const char* to_string(StopReason reason) {
-  switch (reason) {
-    case StopReason::kNone:
-      return "none";
-    case StopReason::kNothingLeft:
-      return "nothing_left";
-    case StopReason::kTimeLimit:
-      return "time_limit";
-    case StopReason::kInterrupted:
-      return "interrupted";
-    case StopReason::kTakeOffFailed:
-      return "take_off_failed";
-    case StopReason::kReturnRequested:
-      return "return_requested";
-    case StopReason::kLandRequested:
-      return "land_requested";
-    case StopReason::kSensorLost:
-      return "sensor_lost";
-    case StopReason::kStageFailed:
-      return "stage_failed";
-    case StopReason::kTrackingLost:
-      return "tracking_lost";
-  }
-  return "?";
-}
-
 Box3d launch_site_m(const MissionConfig& config, const Vector3d& home_m) {
   const double radius_m = config.launch_site_radius_m;
   const double top_m = std::max(config.take_off_height_m, home_m.z()) + kHeadroomM;
@@ -245,8 +195,8 @@ TrajectoryPtr Mission::explore(const ExploreStep& step, Time now) {
 
 // From home there may be a way to what could not be reached from where the exploration ended.
 void Mission::resume_at_home() {
-  if (state_ == MissionState::kDescend && reason_ == StopReason::kNothingLeft &&
-      explorer_.has_open_clusters() && resumptions_ < kMaxResumptions) {
+  if (reason_ == StopReason::kNothingLeft && explorer_.has_open_clusters() &&
+      resumptions_ < kMaxResumptions) {
     ++resumptions_;
     reason_ = StopReason::kNone;
     state_ = MissionState::kExplore;
@@ -272,12 +222,12 @@ bool Mission::is_home(Time now) const {
   return (pilot_.next_start_point(now).position_m - home_m_).head<2>().norm() < kArrivedM;
 }
 
+// It is there, or has tried for long enough.
+bool Mission::is_way_home_over(Time now) const {
+  return strikes_ >= kMaxStrikes || (pilot_.is_at_rest(now) && is_home(now));
+}
+
 TrajectoryPtr Mission::fly_home(Time now) {
-  if (strikes_ >= kMaxStrikes || (pilot_.is_at_rest(now) && is_home(now))) {
-    state_ = MissionState::kDescend;
-    strikes_ = 0;
-    return nullptr;
-  }
   const double waited_s = to_seconds(now - last_leg_);
   const bool in_danger = !pilot_.is_at_rest(now) && pilot_.unsafe_from(now).has_value();
   const bool is_due = pilot_.is_at_rest(now) ? waited_s >= kRetryIntervalS
@@ -306,22 +256,22 @@ TrajectoryPtr Mission::fly_home(Time now) {
   return leg;
 }
 
-// Over once somebody has been heard, or has been waited for.
+// Over once somebody has been heard, has been waited for, or there is no way home.
 TrajectoryPtr Mission::meet(Time now) {
   if (!meeting_.is_wanted()) {
     state_ = MissionState::kExplore;
     return nullptr;
   }
-  TrajectoryPtr leg = fly_home(now);
-  if (state_ == MissionState::kDescend) {
-    state_ = MissionState::kMeet;
-    if (is_home(now)) {
-      meeting_.wait(now);
-    } else {
-      meeting_.give_up();  // there is no way
-    }
+  if (!is_way_home_over(now)) {
+    return fly_home(now);
   }
-  return leg;
+  strikes_ = 0;
+  if (is_home(now)) {
+    meeting_.wait(now);
+  } else {
+    meeting_.give_up();
+  }
+  return nullptr;
 }
 
 TrajectoryPtr Mission::descend(Time now) {
@@ -385,7 +335,12 @@ MissionStep Mission::on_map(const MapSnapshotPtr& snapshot, Time now) {
       step.published = explore(step.explore, now);
       break;
     case MissionState::kReturnHome:
-      step.published = fly_home(now);
+      if (!is_way_home_over(now)) {
+        step.published = fly_home(now);
+        break;
+      }
+      state_ = MissionState::kDescend;
+      strikes_ = 0;
       resume_at_home();
       break;
     case MissionState::kDescend:

@@ -7,9 +7,8 @@
 // flown after a number of tries ends the mission where the vehicle is, at rest in known free space.
 #pragma once
 
-#include <cstdint>
-
 #include "understory/explorer.hpp"
+#include "understory/mission_state.hpp"
 #include "understory/team/meeting.hpp"
 
 namespace understory {
@@ -35,33 +34,6 @@ struct MissionConfig {
     f.field("auto_start", auto_start, "false: the vehicle stays where it is until told to start");
   }
 };
-
-enum class MissionState : std::uint8_t {
-  kWaiting,
-  kPaused,
-  kTakeOff,
-  kExplore,
-  kReturnHome,
-  kDescend,
-  kLand,
-  kStopped,
-  kMeet,  // at home or on the way there, to meet team mates; then it explores on
-};
-[[nodiscard]] const char* to_string(MissionState state);
-
-enum class StopReason : std::uint8_t {
-  kNone,
-  kNothingLeft,
-  kTimeLimit,
-  kInterrupted,
-  kTakeOffFailed,
-  kReturnRequested,
-  kLandRequested,
-  kSensorLost,
-  kStageFailed,
-  kTrackingLost,
-};
-[[nodiscard]] const char* to_string(StopReason reason);
 
 // What the operator vouches for; to be marked free in the map before the first update.
 [[nodiscard]] Box3d launch_site_m(const MissionConfig& config, const Vector3d& home_m);
@@ -122,6 +94,7 @@ class Mission {
   void resume_at_home();
   [[nodiscard]] std::vector<Vector3d> route_home(Time now);
   [[nodiscard]] bool is_home(Time now) const;
+  [[nodiscard]] bool is_way_home_over(Time now) const;
   TrajectoryPtr fly_home(Time now);
   TrajectoryPtr meet(Time now);
   TrajectoryPtr descend(Time now);

@@ -9,11 +9,8 @@
 #include <optional>
 #include <vector>
 
+#include "understory/mission_state.hpp"
 #include "understory/plan/trajectory.hpp"
-
-namespace understory {
-enum class MissionState : std::uint8_t;  // of mission.hpp, which knows team mates
-}
 
 namespace understory::team {
 

@@ -12,7 +12,7 @@
 #include <optional>
 #include <vector>
 
-#include "understory/mission.hpp"
+#include "understory/mission_state.hpp"
 #include "understory/plan/trajectory.hpp"
 #include "understory/team/layer_tile.hpp"
 #include "understory/team/link.hpp"
