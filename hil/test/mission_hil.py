@@ -5,28 +5,19 @@
 import json
 import os
 import re
-import shlex
 import signal
 import subprocess
-import tempfile
 import time
 import unittest
 from pathlib import Path
-from typing import Any, List
+from typing import List
 
-from bench import HOST_BUS, MEMORY, ROOT, FlightTest, Program, summary_of
+from bench import HOST_BUS, ROOT, summary_of
 from can_tools import must_run, wait_until
+from mission_bench import VEHICLE, MissionTest
 
-TREE = Path(os.environ.get("UNDERSTORY_ROOT", ROOT))
-WORKSPACE = TREE / "catkin_ws" / "devel"
-ONBOARD = WORKSPACE / "lib" / "understory_nodelets" / "onboard"
-VEHICLE = WORKSPACE / "lib" / "understory_hil" / "understory_vehicle"
-FLY = TREE / "src" / "understory_nodelets" / "onboard" / "fly.py"
 LOG_TOOL = ROOT / "firmware_bridge" / "log" / "log.py"
-# The processor is shared with the camera, the map and the vehicle.
-LITTLE = ["--scenario", "clearing", "--camera-size", "160x120", "--quiet", "--no-report"]
 MISSION_PATIENCE_S = 100.0
-STOP_PATIENCE_S = 60.0
 HOLD_S, LAND_S = 0.25, 1.0
 NEAR_M = 1.5
 
@@ -50,24 +41,7 @@ def decodes_with_wireshark(log_path: Path, folder: Path) -> None:
     assert not odd, f"tshark did not decode {len(odd)} frames, such as {odd[0]}"
 
 
-class AMission(FlightTest):
-    def setUp(self) -> None:
-        super().setUp()
-        for path in (ONBOARD, VEHICLE):
-            if not path.exists():
-                self.skipTest(f"{path} is not built")
-        folder = tempfile.TemporaryDirectory(prefix="mission_hil_", dir=MEMORY)
-        self.addCleanup(folder.cleanup)
-        self.folder = Path(folder.name)
-
-    def start_mission(self, *words: Any) -> Program:
-        command = ["/usr/bin/python3", "-B", FLY, "--bus", HOST_BUS, "--onboard", ONBOARD]
-        command += ["--vehicle", VEHICLE, "--out", self.folder / "out", *LITTLE, *words]
-        line = shlex.join(map(str, command))
-        mission = self.run_program("bash", "-c", f". {WORKSPACE}/setup.bash; exec {line}")
-        self.addCleanup(mission.stop, STOP_PATIENCE_S)  # it has programs of its own to end
-        return mission
-
+class AMission(MissionTest):
     @staticmethod
     def children(process_id: int, name: str) -> List[int]:
         found = []
@@ -86,11 +60,11 @@ class AMission(FlightTest):
 
         status = mission.wait(MISSION_PATIENCE_S)
 
-        result = json.loads((self.folder / "out" / "result.json").read_text(encoding="utf-8"))
+        result = json.loads((self.out / "result.json").read_text(encoding="utf-8"))
         print(f"    {({key: result[key] for key in list(result)[:8]})}")
         self.assertEqual(status, 0, mission.lines[-5:])
         self.assertEqual(result["collisions"], 0)
-        log_path = self.folder / "out" / "bus.log"
+        log_path = self.out / "bus.log"
         decodes_with_wireshark(log_path, self.folder / "wireshark")
         summary = summary_of(log_path)
         spans = [(span["state"], span["reason"]) for span in summary["vehicle"]]

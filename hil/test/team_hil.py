@@ -4,18 +4,16 @@
 lost on the way, or the user has seen enough."""
 
 import json
-import os
-import shlex
 import signal
 import sys
-import tempfile
 import time
-from pathlib import Path
-from typing import Any, List
+from typing import List
 
-from bench import MEMORY, ROOT, FlightTest, Program
+from bench import ROOT
+from mission_bench import STOP_PATIENCE_S, MissionTest
 
 sys.path.append(str(ROOT / "src" / "understory_nodelets" / "onboard"))
+import fly  # noqa: E402  pylint: disable=wrong-import-position
 from fly_team import (  # noqa: E402  pylint: disable=wrong-import-position
     Mate,
     last_tick,
@@ -23,39 +21,18 @@ from fly_team import (  # noqa: E402  pylint: disable=wrong-import-position
 )
 
 HIL_OPTIONS = ["--interfaces", "2"]
-TREE = Path(os.environ.get("UNDERSTORY_ROOT", ROOT))
-WORKSPACE = TREE / "catkin_ws" / "devel"
-ONBOARD = WORKSPACE / "lib" / "understory_nodelets" / "onboard"
-VEHICLE = WORKSPACE / "lib" / "understory_hil" / "understory_vehicle"
-FLY = TREE / "src" / "understory_nodelets" / "onboard" / "fly.py"
-# As fly.py does it where a kernel is booted: its processor is shared by all.
-LITTLE = ["--bus-rate", "40", "--camera-rate", "5", "--camera-size", "160x120"]
-LITTLE += ["--overrides", "replan: {lead_s: 0.5}"]
+# As fly.py does it where a kernel is booted.
+TEAM = ["--team", "2", "--bus-rate", fly.KERNEL_BUS_HZ, "--camera-rate", fly.KERNEL_CAMERA_HZ]
+TEAM += ["--overrides", fly.KERNEL_LEAD]
 PATIENCE_S = 110.0
-STOP_PATIENCE_S = 60.0
 SAFETY_DISTANCE_M = 0.8
 LEAST_FRAMES = 1000
 
 
-class ATeam(FlightTest):
+class ATeam(MissionTest):
     def setUp(self) -> None:
         super().setUp()
-        for path in (ONBOARD, VEHICLE):
-            if not path.exists():
-                self.skipTest(f"{path} is not built")
-        folder = tempfile.TemporaryDirectory(prefix="team_hil_", dir=MEMORY)
-        self.addCleanup(folder.cleanup)
-        self.folder = Path(folder.name)
-        self.mates = [Mate(number, self.folder / f"vehicle_{number}") for number in (0, 1)]
-
-    def start_team(self, *words: Any) -> Program:
-        command = ["/usr/bin/python3", "-B", FLY, "--bus", "vcan0", "--team", "2", *LITTLE]
-        command += ["--scenario", "clearing", "--onboard", ONBOARD, "--vehicle", VEHICLE]
-        command += ["--out", self.folder, "--quiet", "--no-report", *words]
-        line = shlex.join(map(str, command))
-        team = self.run_program("bash", "-c", f". {WORKSPACE}/setup.bash; exec {line}")
-        self.addCleanup(team.stop, STOP_PATIENCE_S)
-        return team
+        self.mates = [Mate(number, self.out / f"vehicle_{number}") for number in (0, 1)]
 
     def result_of(self, mate: Mate) -> dict:
         result = json.loads((mate.folder / "result.json").read_text(encoding="utf-8"))
@@ -67,7 +44,7 @@ class ATeam(FlightTest):
         return (mate.folder / "bus.log").read_text(encoding="ascii").splitlines()
 
     def test_completes_the_map_when_one_is_lost_on_the_way(self) -> None:
-        team = self.start_team("--kill", "0@8")
+        team = self.start_mission(*TEAM, "--kill", "0@8")
 
         status = team.wait(PATIENCE_S)
 
@@ -85,7 +62,7 @@ class ATeam(FlightTest):
             self.assertIn(f" vcan{mate.number} ", frames[0])
 
     def test_comes_to_rest_when_interrupted_and_nothing_is_lost(self) -> None:
-        team = self.start_team()
+        team = self.start_mission(*TEAM)
         until = time.monotonic() + PATIENCE_S
         while not all(mate.time_s() > 3.0 for mate in self.mates):
             self.assertLess(time.monotonic(), until)
