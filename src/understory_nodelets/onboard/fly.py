@@ -225,11 +225,10 @@ def words_for_kernel(arguments: argparse.Namespace) -> List[str]:
         arguments.bus = MEMORY
         return []
     words = []
-    for option, is_given, rate_hz in (
-        ("--bus-rate", arguments.bus_rate is not None, KERNEL_BUS_HZ),
-        ("--camera-rate", arguments.camera_rate or "camera:" in arguments.overrides, KERNEL_CAMERA_HZ),
-    ):
-        words += [] if is_given else [option, f"{rate_hz:g}"]
+    if arguments.bus_rate is None:
+        words += ["--bus-rate", f"{KERNEL_BUS_HZ:g}"]
+    if arguments.camera_rate is None and "camera:" not in arguments.overrides:
+        words += ["--camera-rate", f"{KERNEL_CAMERA_HZ:g}"]
     if "replan:" not in arguments.overrides:
         words += ["--overrides", "\n".join(filter(None, [arguments.overrides, KERNEL_LEAD]))]
     print(f"{begin}: both in a booted one, {' '.join(words)}", file=sys.stderr)
