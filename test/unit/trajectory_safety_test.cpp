@@ -155,6 +155,27 @@ TEST(PlanBrake, StopsAsSoonAsTheLimitsAllow) {
   EXPECT_LT((end_of(*brake) - start.position_m).norm(), 0.5 * speed_mps * speed_mps + 0.35);
 }
 
+// On a circle flown as fast as its limits allow, all acceleration goes into the turn.
+TEST(PlanBrake, StopsAsSoonInABend) {
+  const PlanRoom room(open_room());
+  Trajectory flown = planned_across(room);
+  const double speed_mps = 1.4;
+  const double radius_m = 1.02 * speed_mps * speed_mps / flown.limits.acceleration_mps2;
+  flown.position.control_points.clear();
+  for (int i = 0; i < 60; ++i) {
+    const double angle_rad = i * flown.position.knot_s * speed_mps / radius_m;
+    flown.position.control_points.emplace_back(
+        radius_m * std::cos(angle_rad), radius_m * std::sin(angle_rad), 1.0);
+  }
+
+  const Time from = flown.start + duration_from_seconds(1.0);
+  const Result<Trajectory, PlanError> brake = room.brake(flown, from);
+
+  ASSERT_TRUE(brake.has_value()) << to_string(brake.error());
+  EXPECT_EQ(fault_in(*brake, *room.snapshot, brake_requirements(flown, from, room.config)), "");
+  EXPECT_LT(brake->position.duration_s(), speed_mps / flown.limits.acceleration_mps2 + 0.7);
+}
+
 TEST(PlanBrake, StopsBeforeWhatHasAppearedOnThePath) {
   const Trajectory flown = planned_across(PlanRoom(open_room()));
   const PlanRoom room(room_with_wall(1.0));

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <array>
 #include <cmath>
+#include <utility>
 
 #include "understory/plan/clearance_rule.hpp"
 #include "understory/plan/control_point_chain.hpp"
@@ -82,10 +83,19 @@ Result<Trajectory, PlanError> TrajectoryPlanner::plan_brake(const ClearanceMap& 
   };
   const CubicBSpline<Vector3d>::Sample start{
       now.position_m, now.velocity_mps, now.acceleration_mps2};
-  if (accepted(brake_along(flown, to_seconds(from - flown.start), start))) {
-    return brake;
+  // Along a bend most of the acceleration goes into the turn: straight on stops sooner.
+  std::array<CubicBSpline<Vector3d>, 2> ways = {
+      brake_along(flown, to_seconds(from - flown.start), start),
+      brake_turning(flown.limits, 0.0, start)};
+  if (ways[1].duration_s() < ways[0].duration_s()) {
+    std::swap(ways[0], ways[1]);
   }
-  for (const double turn_rad : {0.0, 0.4, -0.4, 0.8, -0.8, 1.3, -1.3}) {
+  for (CubicBSpline<Vector3d>& way : ways) {
+    if (accepted(std::move(way))) {
+      return brake;
+    }
+  }
+  for (const double turn_rad : {0.4, -0.4, 0.8, -0.8, 1.3, -1.3}) {
     if (accepted(brake_turning(flown.limits, turn_rad, start))) {
       return brake;
     }
