@@ -2,6 +2,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "understory/plan/pilot.hpp"
 
+#include <cmath>
+
 #include <gtest/gtest.h>
 
 #include "support/plan_room.hpp"
@@ -192,6 +194,68 @@ TEST(Pilot, BrakeDropsWhatWasToFollow) {
   ASSERT_TRUE(braked.has_value());
   EXPECT_EQ(pilot.follower().newest(), *braked);
   EXPECT_LT((pilot.follower().sample(at_s(60.0)).position_m - end_of(**braked)).norm(), 1e-9);
+}
+
+TEST(Pilot, WhoBrakesAlreadyDoesNotBeginAnew) {
+  Pilot pilot = pilot_in(open_room().build());
+  ASSERT_TRUE(pilot.fly(goal_at(kStart_m, {3, 0, 1}), at_s(1.0)).has_value());
+  const Result<TrajectoryPtr, PlanError> first = pilot.brake(at_s(3.0));
+  ASSERT_TRUE(first && *first);
+
+  const Result<TrajectoryPtr, PlanError> again = pilot.brake(at_s(3.1));
+
+  ASSERT_TRUE(again.has_value());
+  EXPECT_EQ(*again, nullptr);
+  EXPECT_EQ(pilot.follower().newest(), *first);
+  EXPECT_EQ(pilot.counters().brakes, 1U);
+}
+
+// (3 m/s)^2 / (2 m/s2) is 4.5 m for two of them, who see each other from 4.5 m.
+TEST(Pilot, WaryItFliesSoThatTwoCanStopAndLooksWhereItFlies) {
+  FlightGoal goal = goal_at(kStart_m, {4, 2, 1});
+  goal.yaw_rad = -2.5;
+  goal.limits = {3.0, 2.0, 0.9, 2.0};
+  double fastest_mps = 0.0;
+  double widest_rad = 0.0;
+  Pilot pilot = pilot_in(open_room().build());
+  pilot.be_wary(4.5);
+  const Result<TrajectoryPtr, PlanError> flown = pilot.fly(goal, at_s(1.0));
+  ASSERT_TRUE(flown.has_value());
+  for (Time time = (*flown)->start; time < (*flown)->end(); time += Duration(10000)) {
+    const TrajectoryPoint point = (*flown)->sample(time);
+    const double speed_mps = point.velocity_mps.norm();
+    fastest_mps = std::max(fastest_mps, speed_mps);
+    if (speed_mps > 1.0 && (point.position_m - Vector3d(4, 2, 1)).norm() > 1.0) {
+      const double heading_rad = std::atan2(point.velocity_mps.y(), point.velocity_mps.x());
+      widest_rad = std::max(widest_rad, std::abs(angle_difference(heading_rad, point.yaw_rad)));
+    }
+  }
+
+  EXPECT_LT(fastest_mps, 2.0);
+  EXPECT_GT(fastest_mps, 1.8);
+  EXPECT_LT(widest_rad, 0.5);
+  EXPECT_NEAR(angle_difference((*flown)->sample((*flown)->end()).yaw_rad, -2.5), 0.0, 1e-6);
+
+  pilot = pilot_in(open_room().build());
+  ASSERT_TRUE(pilot.fly(goal, at_s(1.0)).has_value());
+  EXPECT_GT(pilot.follower().sample(at_s(3.5)).velocity_mps.norm(), 2.2);
+}
+
+TEST(Pilot, WaryItIsSlowUntilItsCameraHasTurned) {
+  Pilot pilot(PlanConfig{}, kLead);
+  pilot.take_position(kStart_m, 3.1, Time{});
+  pilot.update_map(open_room().build());
+  pilot.be_wary(4.5);
+
+  const Result<TrajectoryPtr, PlanError> flown = pilot.fly(goal_at(kStart_m, {4, 0, 1}), at_s(1.0));
+
+  ASSERT_TRUE(flown.has_value());
+  for (Time time = (*flown)->start; time < (*flown)->end(); time += Duration(10000)) {
+    const TrajectoryPoint point = (*flown)->sample(time);
+    if (std::abs(angle_difference(point.yaw_rad, 0.0)) > 0.7) {
+      ASSERT_LT(point.velocity_mps.norm(), 0.8) << to_seconds(time);
+    }
+  }
 }
 
 TEST(Pilot, WithdrawnTrajectoryIsAsIfItHadNeverBeenHandedOut) {

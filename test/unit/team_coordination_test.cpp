@@ -154,8 +154,8 @@ TEST(TeamTraffic, ASilentTeamMateIsGivenMoreRoomTheLongerItIsSilent) {
   const Time soon{std::chrono::seconds(1)};
   const Time later{std::chrono::seconds(10)};
 
-  EXPECT_EQ(traffic_of(config, {silent}, soon).obstruction_of(past), Obstruction::kNone);
-  EXPECT_EQ(traffic_of(config, {silent}, later).obstruction_of(past), Obstruction::kStanding);
+  EXPECT_EQ(traffic_of(config, {silent}, {}, soon).obstruction_of(past), Obstruction::kNone);
+  EXPECT_EQ(traffic_of(config, {silent}, {}, later).obstruction_of(past), Obstruction::kStanding);
 }
 
 }  // namespace

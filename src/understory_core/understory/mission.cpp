@@ -45,6 +45,7 @@ Mission::Mission(const MissionConfig& config,
       pilot_(explorer.plan, duration_from_seconds(explorer.replan.lead_s)),
       explorer_(explorer, geometry),
       meeting_(explorer.team.coordination),
+      lookout_(explorer.team),
       home_m_(home_m),
       home_yaw_rad_(yaw_rad),
       state_(config.auto_start ? MissionState::kTakeOff : MissionState::kWaiting),
@@ -293,14 +294,28 @@ TrajectoryPtr Mission::descend(Time now) {
 }
 
 void Mission::set_peers(const team::Peers& peers, Time now) {
-  pilot_.set_traffic(team::traffic_of(explorer_config_.team, peers, now));
+  const Vector3d here_m = pilot_.follower().newest()->sample(now).position_m;
+  peers_ = peers;
   explorer_.set_peers(peers);
-  meeting_.observe(peers, pilot_.follower().newest()->sample(now).position_m, now);
+  meeting_.observe(peers, here_m, now);
+  lookout_.hear(peers, here_m);
+}
+
+void Mission::watch_out(const MapSnapshot& map, Time now) {
+  const team::TeamConfig& team = explorer_config_.team;
+  if (team.size == 1) {
+    return;
+  }
+  lookout_.see(map.intruders_m, now);
+  pilot_.be_wary(lookout_.is_wary(now) ? std::optional(explorer_config_.camera.max_range_m)
+                                       : std::nullopt);
+  pilot_.set_traffic(team::traffic_of(team, peers_, lookout_.movers(now), now));
   explorer_.avoid(pilot_.barriers(now));
 }
 
 MissionStep Mission::on_map(const MapSnapshotPtr& snapshot, Time now) {
   MissionStep step;
+  watch_out(*snapshot, now);
   pilot_.update_map(snapshot);
   has_map_ = true;
   explorer_.observe(snapshot);

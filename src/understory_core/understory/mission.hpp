@@ -9,6 +9,7 @@
 
 #include "understory/explorer.hpp"
 #include "understory/mission_state.hpp"
+#include "understory/team/lookout.hpp"
 #include "understory/team/meeting.hpp"
 
 namespace understory {
@@ -86,6 +87,8 @@ class Mission {
   [[nodiscard]] const Explorer& explorer() const { return explorer_; }
 
  private:
+  // For team mates: for those heard, and those that this map's cloud shows.
+  void watch_out(const MapSnapshot& map, Time now);
   [[nodiscard]] bool is_flying_unwatched() const;
   TrajectoryPtr brake(Time now);
   void end_exploration(StopReason reason, Time now);
@@ -105,6 +108,8 @@ class Mission {
   Pilot pilot_;
   Explorer explorer_;
   team::Meeting meeting_;
+  team::Peers peers_;
+  team::Lookout lookout_;
   Vector3d home_m_;
   double home_yaw_rad_;
   bool has_map_ = false;  // without one nothing but rest is flown

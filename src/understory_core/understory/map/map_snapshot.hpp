@@ -26,6 +26,7 @@ struct MapSnapshot {
   Time stamp{};                         // exposure of the newest cloud in it
   std::vector<TilePtr> tiles;           // geometry.slot_count() of them
   std::vector<TileSlot> changed_tiles;  // since the previous revision, ascending
+  std::vector<Vector3d> intruders_m{};  // seen since then amid what was free: they move
 
   [[nodiscard]] const Tile* tile_at(const VoxelIndex& voxel) const {
     return geometry.contains(voxel) ? tiles[geometry.slot_of(voxel)].get() : nullptr;

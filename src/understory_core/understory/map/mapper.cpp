@@ -6,6 +6,7 @@
 #include <cassert>
 #include <cmath>
 
+#include "understory/map/intruders.hpp"
 #include "understory/map/ray_integration.hpp"
 
 namespace understory {
@@ -24,7 +25,7 @@ bool is_valid(const Pose& pose) {
 
 MapSnapshot unknown_map(const MapConfig& config, const Box3d& box_m) {
   MapSnapshot map{
-      GridGeometry(config.resolution_m, box_m), SensorModel(config.sensor), 0, Time{}, {}, {}};
+      GridGeometry(config.resolution_m, box_m), SensorModel(config.sensor), 0, Time{}, {}, {}, {}};
   map.tiles.resize(map.geometry.slot_count());
   return map;
 }
@@ -105,6 +106,7 @@ Result<IntegrateCounts, IntegrateError> Mapper::integrate(const CameraModel& cam
       window_.mark_miss(own_voxel);  // every ray starts in it
     }
   }
+  note_intruders();
   IntegrateCounts counts = apply_window();
   counts.skipped_points = skipped;
   current_.stamp = std::max(current_.stamp, exposure);
@@ -158,10 +160,16 @@ Result<IntegrateCounts, IntegrateError> Mapper::integrate_rays(const PointsView&
       marker.mark_no_return(world_from_sensor.linear() * direction);
     }
   }
+  note_intruders();
   IntegrateCounts counts = apply_window();
   counts.skipped_points = skipped;
   current_.stamp = std::max(current_.stamp, exposure);
   return counts;
+}
+
+void Mapper::note_intruders() {
+  const std::vector<Vector3d> seen_m = intruders_in(window_, current_);
+  current_.intruders_m.insert(current_.intruders_m.end(), seen_m.begin(), seen_m.end());
 }
 
 IntegrateCounts Mapper::apply_window() {
@@ -240,7 +248,9 @@ MapSnapshotPtr Mapper::publish() {
   }
   current_.changed_tiles = std::move(touched_);
   touched_.clear();
-  return std::make_shared<const MapSnapshot>(current_);
+  MapSnapshotPtr published = std::make_shared<const MapSnapshot>(current_);
+  current_.intruders_m.clear();
+  return published;
 }
 
 Tile& Mapper::writable_tile(TileSlot slot) {

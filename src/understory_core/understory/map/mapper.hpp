@@ -78,6 +78,8 @@ class Mapper {
   [[nodiscard]] const GridGeometry& geometry() const { return current_.geometry; }
 
  private:
+  // Before the window is applied.
+  void note_intruders();
   // Hits and misses of the window into the tiles; clones a tile only if a voxel of it changes.
   IntegrateCounts apply_window();
   IntegrateCounts apply_marks(TileSlot slot, const TileMarks& marks);

@@ -142,6 +142,27 @@ std::vector<SeenSight> seen_on_the_way(const ClearanceMap& map,
   return all;
 }
 
+CubicBSpline<double> yaw_ahead(const Trajectory& flown) {
+  constexpr double kStanding_mps = 0.1;
+  constexpr double kLast_m = 0.8;  // has been looked at by then
+  const CubicBSpline<double>::Sample begin = flown.yaw.sample(0.0);
+  const Vector3d& end_m = flown.position.control_points.back();
+  YawCourse course{{begin.value}};
+  for (double time_s = course.step_s; time_s < flown.position.duration_s();
+       time_s += course.step_s) {
+    const CubicBSpline<Vector3d>::Sample there = flown.position.sample(time_s);
+    if ((there.value - end_m).norm() < kLast_m) {
+      break;
+    }
+    const double before_rad = course.yaw_rad.back();
+    const double heading_rad = there.first.head<2>().norm() > kStanding_mps
+                                   ? std::atan2(there.first.y(), there.first.x())
+                                   : before_rad;
+    course.yaw_rad.push_back(before_rad + angle_difference(heading_rad, before_rad));
+  }
+  return yaw_spline_along(begin, course, flown.yaw.control_points.back(), flown.limits);
+}
+
 std::optional<CubicBSpline<double>> looking_yaw(const std::vector<SeenSight>& seen,
                                                 const Trajectory& flown,
                                                 const LookConfig& config) {

@@ -60,6 +60,10 @@ struct SeenSight {
                                                      const Trajectory& flown,
                                                      const LookConfig& config);
 
+// Where it flies to, as well as the yaw limits allow, and then to where its yaw ends: later, if
+// need be.
+[[nodiscard]] CubicBSpline<double> yaw_ahead(const Trajectory& flown);
+
 // Nothing: there is nothing to see on the way, or no time for it. `config` may spare more time than
 // the one by which the sights were seen.
 [[nodiscard]] std::optional<CubicBSpline<double>> looking_yaw(const std::vector<SeenSight>& seen,

@@ -3,8 +3,40 @@
 #include "understory/plan/pilot.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 namespace understory {
+namespace {
+
+// From the instant that two who fly head on can see each other to when both brake.
+constexpr double kReaction_s = 0.45;
+// Two vehicles, and as much again between them.
+constexpr double kRoomPerRadius = 4.0;
+// Where it cannot see, until its camera has turned.
+constexpr double kBlind_mps = 0.7;
+
+// With which two who fly head on, and see each other over this distance, stop before they meet.
+double speed_that_stops_within(double sight_m, double acceleration_mps2) {
+  const double lost_mps = acceleration_mps2 * kReaction_s;
+  return std::sqrt(lost_mps * lost_mps + acceleration_mps2 * std::max(0.0, sight_m)) - lost_mps;
+}
+
+// Does the camera look where it flies fast?
+bool sees_its_way(const Trajectory& planned, const LookConfig& look) {
+  constexpr Duration kStep = std::chrono::milliseconds(100);
+  for (Time time = planned.start; time < planned.end(); time += kStep) {
+    const TrajectoryPoint point = planned.sample(time);
+    const Vector3d& velocity_mps = point.velocity_mps;
+    const double heading_rad = std::atan2(velocity_mps.y(), velocity_mps.x());
+    if (velocity_mps.head<2>().norm() > 1.1 * kBlind_mps &&
+        std::abs(angle_difference(heading_rad, point.yaw_rad)) > look.half_field_rad) {
+      return false;
+    }
+  }
+  return true;
+}
+
+}  // namespace
 
 Pilot::Pilot(const PlanConfig& config, Duration lead)
     : config_(config), lead_(lead), planner_(config) {}
@@ -25,7 +57,7 @@ TrajectoryPtr Pilot::accept(Trajectory trajectory, Time now) {
   return shared;
 }
 
-std::optional<Time> Pilot::unsafe_from(Time now) const {
+std::optional<Time> Pilot::blocked_from(Time now) const {
   const double radius_m = config_.vehicle_radius_m + config_.recheck_margin_m;
   const std::vector<TrajectoryPtr>& queue = follower_.queue();
   for (std::size_t i = 0; i < queue.size(); ++i) {
@@ -36,7 +68,12 @@ std::optional<Time> Pilot::unsafe_from(Time now) const {
       return unsafe;
     }
   }
-  return traffic_.must_give_way_at(*follower_.newest(), now);
+  return std::nullopt;
+}
+
+std::optional<Time> Pilot::unsafe_from(Time now) const {
+  const std::optional<Time> blocked = blocked_from(now);
+  return blocked ? blocked : traffic_.must_give_way_at(*follower_.newest(), now);
 }
 
 Result<TrajectoryPtr, PlanError> Pilot::fly(const FlightGoal& goal, Time now) {
@@ -48,8 +85,18 @@ Result<TrajectoryPtr, PlanError> Pilot::fly(const FlightGoal& goal, Time now) {
   request.goal_yaw_rad = goal.yaw_rad;
   request.sights = goal.sights;
   request.limits = goal.limits;
+  if (sight_m_) {
+    request.looks_ahead = true;
+    const double room_m = *sight_m_ - kRoomPerRadius * config_.vehicle_radius_m;
+    request.limits.speed_mps = std::min(
+        goal.limits.speed_mps, speed_that_stops_within(room_m, goal.limits.acceleration_mps2));
+  }
   request.mode = goal.mode;
   Result<Trajectory, PlanError> planned = planner_.plan(clearance_, request);
+  if (sight_m_ && planned && !sees_its_way(*planned, config_.look)) {
+    request.limits.speed_mps = std::min(request.limits.speed_mps, kBlind_mps);
+    planned = planner_.plan(clearance_, request);
+  }
   ++counters_.plans;
   if (!planned) {
     ++counters_.failed_plans;
@@ -64,6 +111,9 @@ Result<TrajectoryPtr, PlanError> Pilot::fly(const FlightGoal& goal, Time now) {
 }
 
 Result<TrajectoryPtr, PlanError> Pilot::brake(Time now) {
+  if (follower_.newest()->mode == FlightMode::kBrake && !blocked_from(now)) {
+    return TrajectoryPtr{};
+  }
   Result<Trajectory, PlanError> planned = planner_.plan_brake(clearance_, follower_.at(now), now);
   ++counters_.brakes;
   if (!planned) {

@@ -46,6 +46,10 @@ class Pilot {
   // Who else flies here, as known now.
   void set_traffic(Traffic traffic) { traffic_ = std::move(traffic); }
 
+  // From now on so that two who see each other over this distance can stop before they meet:
+  // looking where it flies, and slower if need be. Null: as it likes.
+  void be_wary(std::optional<double> sight_m) { sight_m_ = sight_m; }
+
   // Where routes for a trajectory planned now do not lead.
   [[nodiscard]] Barriers barriers(Time now) const {
     return traffic_.barriers(next_start_point(now).position_m, next_start(now));
@@ -62,6 +66,7 @@ class Pilot {
   [[nodiscard]] std::optional<Time> unsafe_from(Time now) const;
 
   Result<TrajectoryPtr, PlanError> fly(const FlightGoal& goal, Time now);
+  // Null: it brakes already, and to brake anew would only put it off.
   Result<TrajectoryPtr, PlanError> brake(Time now);
   // As if it had never been handed out: what was flown before holds on.
   void withdraw(const TrajectoryPtr& trajectory) { follower_.remove(trajectory); }
@@ -71,10 +76,13 @@ class Pilot {
   [[nodiscard]] const PilotCounters& counters() const { return counters_; }
 
  private:
+  // When what is flown first comes too close to what the map has.
+  [[nodiscard]] std::optional<Time> blocked_from(Time now) const;
   TrajectoryPtr accept(Trajectory trajectory, Time now);
 
   PlanConfig config_;
   Duration lead_;
+  std::optional<double> sight_m_;  // while it is wary
   TrajectoryPlanner planner_;
   ClearanceMap clearance_;
   Traffic traffic_;

@@ -208,6 +208,11 @@ bool within_limits(const Trajectory& trajectory) {
 Trajectory TrajectoryPlanner::looking(const ClearanceMap& map,
                                       const PlanRequest& request,
                                       const Trajectory& planned) const {
+  if (request.looks_ahead) {
+    Trajectory trajectory = planned;
+    trajectory.yaw = yaw_ahead(planned);
+    return within_limits(trajectory) ? trajectory : planned;
+  }
   if (!config_.look.is_on || request.sights.empty()) {
     return planned;
   }

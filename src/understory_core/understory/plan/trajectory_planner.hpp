@@ -69,6 +69,7 @@ struct PlanRequest {
   Barriers barriers;              // that the route leads around
   double goal_yaw_rad = 0.0;
   std::vector<Sight> sights;  // to be looked at on the way, where that costs no time
+  bool looks_ahead = false;   // where it flies instead
   Limits limits;
   FlightMode mode = FlightMode::kExplorer;
 };

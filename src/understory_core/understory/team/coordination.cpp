@@ -91,10 +91,13 @@ Box3d region_of(const TeamConfig& config, const Box3d& box_m) {
   return part_of(box_m, config.id, config.size);
 }
 
-Traffic traffic_of(const TeamConfig& config, const Peers& peers, Time now) {
+Traffic traffic_of(const TeamConfig& config,
+                   const Peers& peers,
+                   std::vector<Mover> seen,
+                   Time now) {
   const SeparationConfig& separation = config.separation;
   const double doubt_s = kDoubtPeriods / config.exchange.state_rate_hz;
-  std::vector<Mover> movers;
+  std::vector<Mover> movers = std::move(seen);
   for (const Peer& peer : peers) {
     const double silent_s = std::max(0.0, to_seconds(now - peer.heard_at));
     Mover mover;

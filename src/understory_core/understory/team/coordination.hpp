@@ -35,6 +35,10 @@ struct Errand {
 // the halves, as often as there are vehicles.
 [[nodiscard]] Box3d region_of(const TeamConfig& config, const Box3d& box_m);
 
-[[nodiscard]] Traffic traffic_of(const TeamConfig& config, const Peers& peers, Time now);
+// `seen`: who is known by sight alone.
+[[nodiscard]] Traffic traffic_of(const TeamConfig& config,
+                                 const Peers& peers,
+                                 std::vector<Mover> seen,
+                                 Time now);
 
 }  // namespace understory::team

@@ -134,6 +134,7 @@ MapSnapshotPtr FusedMap::update_own(const MapSnapshot& own) {
   has_own_ = true;
   own_revision_ = own.revision;
   fused_.stamp = own.stamp;
+  fused_.intruders_m = own.intruders_m;
   ++fused_.revision;
   fused_.changed_tiles.clear();
   std::sort(stale_slots_.begin(), stale_slots_.end());

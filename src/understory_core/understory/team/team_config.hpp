@@ -97,6 +97,7 @@ struct SeparationConfig {
   double silent_growth_mps = 0.1;
   double silent_max_m = 3.0;
   double mask_radius_m = 0.6;
+  bool lookout = true;
 
   void visit(FieldVisitor& f) {
     f.field("safety_distance_m",
@@ -116,6 +117,10 @@ struct SeparationConfig {
             mask_radius_m,
             in_range(0.1, 5.0),
             "depth within this distance of a team mate is not mapped");
+    f.field("lookout",
+            lookout,
+            "for team mates that are not heard: by camera, and at an Explorer's pace where one may "
+            "be near");
   }
 };
 
