@@ -264,11 +264,22 @@ TEST(Vehicle, HangsStillInTheLauncherUntilItsMotorsCarryIt) {
   vehicle.hang_in_launcher();
 
   run(vehicle, {}, 5.0);
-  run(vehicle, {0.98 * hover, 0.98 * hover, 0.98 * hover, 0.98 * hover}, 5.0);
+  run(vehicle, {0.94 * hover, 0.94 * hover, 0.94 * hover, 0.94 * hover}, 5.0);
 
   EXPECT_TRUE(vehicle.on_ground());
   EXPECT_EQ(vehicle.state().position_m, Vector3d(1.0, 2.0, 1.5));
   EXPECT_TRUE(vehicle.state().velocity_mps.isZero());
+}
+
+TEST(Vehicle, LeavesTheLauncherWithExactlyTheThrustOfAHover) {
+  const VehicleConfig config;
+  Vehicle vehicle(config, {0.0, 0.0, 1.5}, 0.0, Rng(1));
+  vehicle.hang_in_launcher();
+
+  run(vehicle, hover_commands(config.airframe), 0.5);
+
+  EXPECT_FALSE(vehicle.on_ground());
+  EXPECT_GT(vehicle.state().position_m.z(), 1.48);
 }
 
 TEST(Vehicle, LeavesTheLauncherOnceAndThenFallsWithoutThrust) {

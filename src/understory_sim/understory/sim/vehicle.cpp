@@ -11,6 +11,9 @@ namespace {
 
 constexpr double kGravityMps2 = 9.81;
 constexpr double kVerticalGustShare = 1.0 / 3.0;
+// The launcher lets go when the motors carry the weight but for this. A hover that asks for exactly
+// the weight never carries more.
+constexpr double kLauncherShare = 0.05;
 constexpr double kSettleTimeS = 0.1;  // in which legs on the ground bring the body level
 
 Eigen::Quaterniond rotation_of(const Vector3d& angle_rad) {
@@ -106,7 +109,7 @@ void Vehicle::step(const MotorCommands& commands, double step_s) {
   state_.velocity_mps += step_s * acceleration_mps2_;
 
   const bool was_standing = on_ground_ || is_in_launcher_;
-  is_in_launcher_ = is_in_launcher_ && acceleration_mps2_.z() <= 0.0;
+  is_in_launcher_ = is_in_launcher_ && acceleration_mps2_.z() <= -kLauncherShare * kGravityMps2;
   const bool is_low = state_.position_m.z() <= config_.gear_height_m;
   on_ground_ = is_in_launcher_ || (is_low && state_.velocity_mps.z() <= 0.0);
   if (on_ground_) {
