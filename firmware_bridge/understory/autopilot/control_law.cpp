@@ -221,7 +221,9 @@ Vector3d ControlLaw::torque_nm(const VehicleState& state, const Attitude& wanted
          rates.cross(inertia_kgm2_.cwiseProduct(rates));
 }
 
-// What the motors cannot give is given up in this order: yaw, lift, tilt.
+// What the motors cannot give is given up in this order: yaw, lift, tilt. But for its tilt the
+// vehicle never lifts more than its weight: a tilt that swings would carry it up, less lift would
+// be asked for, which takes more tilt for the same push, and so on without end.
 MotorCommands ControlLaw::mix(double thrust_n, const Vector3d& torque_nm) const {
   const double max_n = airframe_.max_motor_thrust_n;
   const double lever_m = 4.0 * airframe_.arm_m * std::sqrt(0.5);
@@ -233,7 +235,9 @@ MotorCommands ControlLaw::mix(double thrust_n, const Vector3d& torque_nm) const 
     low_n = std::min(low_n, tilt_n[i]);
     high_n = std::max(high_n, tilt_n[i]);
   }
-  const double tilt_share = std::min(1.0, max_n / std::max(high_n - low_n, 1e-9));
+  const double room_below_n = 0.25 * std::max(thrust_n, airframe_.mass_kg * kGravityMps2);
+  const double tilt_share = std::min(
+      {1.0, max_n / std::max(high_n - low_n, 1e-9), room_below_n / std::max(-low_n, 1e-9)});
   const double least_n = -low_n * tilt_share;
   // With all authority taken by the tilt both bounds are one, up to rounding.
   const double most_n = std::max(least_n, max_n - high_n * tilt_share);
