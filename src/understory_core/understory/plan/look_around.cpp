@@ -148,9 +148,9 @@ CubicBSpline<double> yaw_ahead(const Trajectory& flown) {
   const CubicBSpline<double>::Sample begin = flown.yaw.sample(0.0);
   const Vector3d& end_m = flown.position.control_points.back();
   YawCourse course{{begin.value}};
-  for (double time_s = course.step_s; time_s < flown.position.duration_s();
-       time_s += course.step_s) {
-    const CubicBSpline<Vector3d>::Sample there = flown.position.sample(time_s);
+  const auto steps = static_cast<int>(flown.position.duration_s() / course.step_s);
+  for (int step = 1; step <= steps; ++step) {
+    const CubicBSpline<Vector3d>::Sample there = flown.position.sample(step * course.step_s);
     if ((there.value - end_m).norm() < kLast_m) {
       break;
     }

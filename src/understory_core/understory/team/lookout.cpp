@@ -12,7 +12,8 @@ constexpr double kWaryAfterS = 20.0;  // likewise
 constexpr double kSameM = 1.0;        // from one image to the next
 constexpr double kTrust = 0.5;        // in the speed from the last two images
 constexpr double kFastestMps = 4.0;   // more is a wrong match
-constexpr double kAheadS = 1.5;       // where it will be until then is not flown to
+// Where it will be in so many steps of time is not flown to.
+constexpr int kStepsAhead = 6;
 constexpr double kAheadStepS = 0.25;
 // Its middle lies behind the side that is seen, and where it goes is a guess.
 constexpr double kDoubtM = 0.7;
@@ -90,8 +91,9 @@ std::vector<Mover> Lookout::movers(Time now) const {
     Mover mover;
     mover.position_m = sighting.position_at(now);
     mover.extra_m = kDoubtM + kDoubtGrowthMps * to_seconds(now - sighting.seen_at);
-    for (double ahead_s = kAheadStepS; ahead_s <= kAheadS; ahead_s += kAheadStepS) {
-      mover.other_places_m.emplace_back(mover.position_m + ahead_s * sighting.velocity_mps);
+    for (int step = 1; step <= kStepsAhead; ++step) {
+      mover.other_places_m.emplace_back(mover.position_m +
+                                        step * kAheadStepS * sighting.velocity_mps);
     }
     movers.push_back(std::move(mover));
   }
