@@ -19,8 +19,9 @@ TeamConfig team_of(int size) {
   return config;
 }
 
-Peer mate_at(int id, double x_m, bool in_contact) {
+Peer mate_at(int id, double x_m, bool in_contact, double heard_s = 0.0) {
   Peer mate;
+  mate.heard_at = at_s(heard_s);
   mate.id = static_cast<std::uint8_t>(id);
   mate.position_m = {x_m, 0.0, 1.0};
   mate.in_contact = in_contact;
@@ -46,8 +47,8 @@ TEST(Lookout, IsWaryOfWhoFellSilentNearByAndNotOfWhoIsOutOfRange) {
   EXPECT_FALSE(lookout.is_wary(at_s(0.0)));
 
   // It is back, and then it is not the range.
-  lookout.hear({mate_at(1, 5.0, true)}, kHere_m);
-  lookout.hear({mate_at(1, 5.0, false)}, kHere_m);
+  lookout.hear({mate_at(1, 5.0, true, 9.0)}, kHere_m);
+  lookout.hear({mate_at(1, 5.0, false, 9.0)}, kHere_m);
   EXPECT_TRUE(lookout.is_wary(at_s(0.0)));
 }
 
@@ -56,6 +57,7 @@ TEST(Lookout, WhoFellSilentNearByStaysSoHoweverFarOneFlies) {
   Lookout lookout(team_of(2));
 
   lookout.hear({mate_at(1, 5.0, true)}, kHere_m);
+  lookout.hear({mate_at(1, 5.0, true)}, {-30.0, 0.0, 1.0});  // nothing new of it
   lookout.hear({mate_at(1, 5.0, false)}, {-60.0, 0.0, 1.0});
 
   EXPECT_TRUE(lookout.is_wary(at_s(0.0)));

@@ -30,13 +30,13 @@ void Lookout::hear(const Peers& peers, const Vector3d& own_position_m) {
   int heard = 0;
   int far = 0;
   for (const Peer& peer : peers) {
-    if (peer.in_contact) {
-      last_distances_m_[peer.id] = (peer.position_m - own_position_m).norm();
-      ++heard;
-    } else {
-      const auto last = last_distances_m_.find(peer.id);
-      far += last != last_distances_m_.end() && last->second > kFarM ? 1 : 0;
+    const double distance_m = (peer.position_m - own_position_m).norm();
+    Word& last = last_words_.try_emplace(peer.id, Word{peer.heard_at, distance_m}).first->second;
+    if (peer.heard_at > last.heard_at) {
+      last = {peer.heard_at, distance_m};
     }
+    heard += peer.in_contact ? 1 : 0;
+    far += !peer.in_contact && last.from_m > kFarM ? 1 : 0;
   }
   is_anyone_unheard_ = is_on_ && heard < mates_;
   may_be_near_ = is_on_ && heard + far < mates_;

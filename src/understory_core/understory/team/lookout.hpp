@@ -34,6 +34,11 @@ class Lookout {
   [[nodiscard]] bool is_wary(Time now) const;
 
  private:
+  struct Word {
+    Time heard_at{};
+    double from_m = 0.0;  // how far away it was
+  };
+
   struct Sighting {
     Vector3d position_m = Vector3d::Zero();
     Vector3d velocity_mps = Vector3d::Zero();
@@ -50,8 +55,8 @@ class Lookout {
   bool is_on_;
   bool is_anyone_unheard_ = false;
   bool may_be_near_ = false;
-  std::optional<Time> seen_at_;             // anybody
-  std::map<int, double> last_distances_m_;  // when last heard, by id
+  std::optional<Time> seen_at_;     // anybody
+  std::map<int, Word> last_words_;  // by id
   std::vector<Sighting> sightings_;
 };
 
