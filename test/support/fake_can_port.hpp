@@ -51,7 +51,8 @@ class FakeCanPort : public can::CanPort {
     return count;
   }
   void wait(Duration at_most, can::WaitFor what) override {
-    time += at_most;
+    time += at_most - set_back;
+    set_back = Duration(0);
     waited_for.push_back(what);
   }
   [[nodiscard]] Time now() const override { return time; }
@@ -73,6 +74,7 @@ class FakeCanPort : public can::CanPort {
   std::vector<can::WaitFor> waited_for;
   std::deque<can::PortFrame> arrived;
   Time time{};
+  Duration set_back{};  // what the clock is set back by in the next wait
   std::uint64_t session_number = 1;
   can::PortCounters port_counters;
 };

@@ -231,6 +231,20 @@ TEST(CanNode, WakesToNoticeThatNoEchoComes) {
 }
 
 // A frame that comes while nothing of ours is on its way: who answers must hear of it at once.
+TEST(CanNode, AClockThatIsSetBackEndsTheWait) {
+  auto owned = std::make_unique<FakeCanPort>();
+  FakeCanPort& port = *owned;
+  CanNode node(std::move(owned), host_config());
+  Record record;
+  port.time = at_ms(7200000);
+  port.set_back = std::chrono::hours(1);
+
+  node.run_until(port.time, port.time + std::chrono::milliseconds(10), record);
+
+  EXPECT_EQ(port.waited_for.size(), 1U);
+  EXPECT_EQ(node.now(), at_ms(3600010));
+}
+
 TEST(CanNode, OnlyWhoAnswersOrIsSendingWakesForEachFrame) {
   for (const bool answers : {true, false}) {
     CanNodeConfig config = host_config();

@@ -26,7 +26,11 @@ void CanNode::run_until(Time now, Time until, FrameHandler& handler) {
     const Time wake = std::min(until, queue_.wake_at().value_or(until));
     port_->wait(std::max(wake - now, Duration(0)),
                 answers_ || is_sending ? WaitFor::kArrivals : WaitFor::kChanges);
+    const Time before = now;
     now = poll(handler);
+    if (now < before) {
+      return;
+    }
   }
 }
 

@@ -72,7 +72,8 @@ class CanNode : public FrameSink {
   void set_tap(std::shared_ptr<FrameTap> tap) { tap_ = std::move(tap); }
 
   void send(const Frame& frame, Time now) override { queue_.push(frame, now); }
-  // Handles what has arrived and sends what may be sent, until `until`.
+  // Handles what has arrived and sends what may be sent, until `until`. Earlier if the clock is set
+  // back: `until` means nothing then.
   void run_until(Time now, Time until, FrameHandler& handler);
   // The same once, without waiting. Returns the time.
   Time poll(FrameHandler& handler);
