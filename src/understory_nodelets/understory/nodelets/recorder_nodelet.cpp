@@ -152,8 +152,9 @@ class RecorderNodelet : public GuardedNodelet {
       over_since_ns_ = steady_ns();
     }
     const double over_s = static_cast<double>(steady_ns() - over_since_ns_) * 1e-9;
+    // By the last row that was written, so that the record ends with the vehicle at rest.
     const bool is_still = status_->state == MissionState::kStopped && status_->at_rest &&
-                          vehicle_.velocity_mps.norm() < kStillMps;
+                          row_.velocity_mps.norm() < kStillMps;
     if ((status_->is_over() && (flight_.down != 0 || is_still || over_s > kSettleS)) ||
         silent_s > kSilenceS) {
       finish();
