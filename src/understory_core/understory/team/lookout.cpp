@@ -3,6 +3,7 @@
 #include "understory/team/lookout.hpp"
 
 #include <algorithm>
+#include <iterator>
 
 namespace understory::team {
 namespace {
