@@ -46,6 +46,7 @@ class Explorer {
   void observe(const MapSnapshotPtr& snapshot);
   // What is known of team mates now.
   void set_peers(team::Peers peers) { peers_ = std::move(peers); }
+  [[nodiscard]] const team::Peers& peers() const { return peers_; }
   // Where routes do not lead now (Pilot::barriers).
   void avoid(const Barriers& barriers);
   // Call after observe(), with the pilot on the same map.

@@ -295,7 +295,6 @@ TrajectoryPtr Mission::descend(Time now) {
 
 void Mission::set_peers(const team::Peers& peers, Time now) {
   const Vector3d here_m = pilot_.follower().newest()->sample(now).position_m;
-  peers_ = peers;
   explorer_.set_peers(peers);
   meeting_.observe(peers, here_m, now);
   lookout_.hear(peers, here_m);
@@ -309,7 +308,7 @@ void Mission::watch_out(const MapSnapshot& map, Time now) {
   lookout_.see(map.intruders_m, now);
   pilot_.be_wary(lookout_.is_wary(now) ? std::optional(explorer_config_.camera.max_range_m)
                                        : std::nullopt);
-  pilot_.set_traffic(team::traffic_of(team, peers_, lookout_.movers(now), now));
+  pilot_.set_traffic(team::traffic_of(team, explorer_.peers(), lookout_.movers(now), now));
   explorer_.avoid(pilot_.barriers(now));
 }
 

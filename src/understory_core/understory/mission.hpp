@@ -108,7 +108,6 @@ class Mission {
   Pilot pilot_;
   Explorer explorer_;
   team::Meeting meeting_;
-  team::Peers peers_;
   team::Lookout lookout_;
   Vector3d home_m_;
   double home_yaw_rad_;
