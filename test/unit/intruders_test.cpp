@@ -104,7 +104,6 @@ TEST(Intruders, WhereNothingWasKnownNothingIsASurprise) {
   EXPECT_TRUE(watch.see({{3.0, 0.3, 1.1}}).empty());
 }
 
-// Voxels so near to each other that they would be one thing.
 ScanWindow hits_at(const MapSnapshot& map, const std::vector<VoxelIndex>& voxels) {
   ScanWindow window;
   window.reset(map.geometry, map.geometry.box_m());

@@ -4,9 +4,9 @@
 // Team mates that are not heard. What moves in the images (map/intruders.hpp) is one of them, as
 // long as there is any: it is followed from image to image, and for a while after the last one, and
 // is traffic where it is and where it flies on to. And while one may be near, because it was never
-// heard or fell silent near by, a vehicle flies so that two can stop before they meet: no faster
-// than an Explorer, looking where it flies. Who fell silent far away is out of range, and will be
-// heard before it is seen. World frame, SI units. One thread; deterministic; nothing can fail.
+// heard or fell silent near by, a vehicle flies so that two can stop before they meet
+// (Pilot::be_wary). Who fell silent far away is out of range, and will be heard before it is seen.
+// World frame, SI units. One thread; deterministic; nothing can fail.
 #pragma once
 
 #include <map>

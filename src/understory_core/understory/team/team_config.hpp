@@ -119,8 +119,8 @@ struct SeparationConfig {
             "depth within this distance of a team mate is not mapped");
     f.field("lookout",
             lookout,
-            "for team mates that are not heard: by camera, and at an Explorer's pace where one may "
-            "be near");
+            "for team mates that are not heard: by camera, and no faster than two that meet can "
+            "stop where one may be near");
   }
 };
 
